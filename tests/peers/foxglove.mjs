@@ -1,9 +1,9 @@
-// Holds what a viewer is told live against the daemon's log of the same scans.
+// Compares the live messages of the daemon with its log of the same scans.
 //
-//   tests/peers/foxglove.sh [PROGRAM]        starts daemons, and calls this
-//   foxglove.mjs watch ADDRESS TOKEN_FILE    is told everything, until it is ended
+//   tests/peers/foxglove.sh [PROGRAM]        starts daemons and calls this script
+//   foxglove.mjs watch ADDRESS TOKEN_FILE    subscribes to every topic until it is stopped
 //
-// Foxglove's client library subscribes to every topic and its decoders read the messages; the log is read without sonard.
+// Foxglove's client library subscribes to every topic, its decoders read the messages; the log is parsed here, without sonard.
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
@@ -17,13 +17,13 @@ const { MessageReader } = require("@foxglove/rosmsg2-serialization");
 const { FoxgloveClient } = require("@foxglove/ws-protocol");
 const { WebSocket } = require("ws");
 
-/** Scans that are compared; one before them says what topics there are. */
+/** Number of compared scans; a preceding one makes the daemon advertise all topics. */
 const SCANS = 2;
 const [name, address, tokenFile, folder, program] = process.argv.slice(2);
 const token = fs.readFileSync(tokenFile, "utf8");
 const radians = (degrees) => (degrees * Math.PI) / 180;
 
-/** Connects as a viewer by a name of the protocol, and takes whatever topic there is. */
+/** Connects a viewer with a subprotocol and subscribes to every advertised topic. */
 function connect(protocol) {
   const url = `ws://${address}/foxglove/?token=${token}`;
   const client = new FoxgloveClient({ ws: new WebSocket(url, [protocol]) });
@@ -53,10 +53,10 @@ async function until(what, is) {
     if (is()) return;
     await new Promise((done) => setTimeout(done, 50));
   }
-  assert.fail(`nothing came of ${what}`);
+  assert.fail(`timeout: no ${what}`);
 }
 
-async function ask(method, route, body) {
+async function request(method, route, body) {
   const headers = { Authorization: `Bearer ${token}`, "Content-Type": "application/json" };
   const answer = await fetch(`http://${address}${route}`, { method, headers, body });
   assert(answer.ok, `${route}: ${answer.status}`);
@@ -68,7 +68,7 @@ function readLog() {
   for (const file of fs.readdirSync(folder).filter((file) => file.endsWith(".jsonl")).sort()) {
     for (const line of fs.readFileSync(path.join(folder, file), "utf8").split("\n").filter(Boolean)) {
       const record = JSON.parse(line);
-      // The scene's text stands in the first session of a log only.
+      // Only the first session of a log contains the scene's text.
       if (record.type === "session") log.session = { scene_text: log.session?.scene_text, ...record };
       if (record.type === "scan_start") log.scans.push({ start: record, pings: [] });
       if (record.type === "ping") log.scans.at(-1).pings.push(record);
@@ -81,14 +81,14 @@ function readLog() {
   return log;
 }
 
-/** A number as it is after it was written as one of 32 bits. */
+/** Rounds a number to 32-bit floating point. */
 const single = (value) => Math.fround(value);
 
 function near(value, expected, tolerance, what) {
   assert(value === expected || Math.abs(value - expected) <= tolerance, `${what}: ${value} is not ${expected}`);
 }
 
-/** Nanoseconds since 1970 of a time in a log, of which Date would keep thousandths of a second. */
+/** Nanoseconds since 1970 of a log's time; Date has milliseconds only. */
 function nanoseconds(time) {
   const [whole, fraction = ""] = time.replace("Z", "").split(".");
   return BigInt(Date.parse(`${whole}Z`)) * 1_000_000n + BigInt(fraction.padEnd(9, "0"));
@@ -96,7 +96,7 @@ function nanoseconds(time) {
 
 const stampOf = ({ sec, nsec, nanosec }) => BigInt(sec) * 1_000_000_000n + BigInt(nsec ?? nanosec);
 
-function told(reading) {
+function expectedRange(reading) {
   return { echo: reading.range_m, no_echo: Infinity, min_range: -Infinity }[reading.status];
 }
 
@@ -109,7 +109,7 @@ function compareRanges(messages, log) {
     const frame = ping.ranger ? `sonar_${ping.ranger}` : "sonar";
     const readings = [[`${above}/range`, ping], [predicted, ping.sim]];
     for (const [topic, reading] of readings) {
-      const range = reading && told(reading);
+      const range = reading && expectedRange(reading);
       if (range == null) continue;
       expected.set(topic, [...(expected.get(topic) ?? []), { range, frame, time: ping.time }]);
     }
@@ -160,7 +160,7 @@ function compareScans(messages, log) {
     near(message.time_increment, gone / (pings.length - 1), 1e-5, "time_increment");
     near(message.scan_time, gone + log.window, 1e-4, "scan_time");
     assert.equal(message.ranges.length, pings.length);
-    pings.forEach((ping) => assert.equal(message.ranges[ping.index], single(told(ping) ?? NaN)));
+    pings.forEach((ping) => assert.equal(message.ranges[ping.index], single(expectedRange(ping) ?? NaN)));
     assert.equal(message.intensities.length, 0);
   });
 }
@@ -188,20 +188,20 @@ function* pointsOf(message) {
 }
 
 function comparePoints(messages, log) {
-  for (const [topic, heard] of [["/sonar/points", (ping) => ping], ["/sonar/predicted/points", (ping) => ping.sim]]) {
-    const scans = log.scans.filter((scan) => scan.pings.some(heard));
+  for (const [topic, reading] of [["/sonar/points", (ping) => ping], ["/sonar/predicted/points", (ping) => ping.sim]]) {
+    const scans = log.scans.filter((scan) => scan.pings.some(reading));
     assert.equal(messages.get(topic)?.length ?? 0, scans.length, topic);
     (messages.get(topic) ?? []).forEach(({ message }, place) => {
       const scan = scans[place];
       assert.equal(message.header.frame_id, "map");
       assert.equal(stampOf(message.header.stamp), nanoseconds(scan.pings[0].time), topic);
       const points = [...pointsOf(message)];
-      const echoes = scan.pings.filter((ping) => heard(ping)?.status === "echo");
+      const echoes = scan.pings.filter((ping) => reading(ping)?.status === "echo");
       assert.deepEqual(points.map(({ index }) => index), echoes.map(({ index }) => index), topic);
       points.forEach((point, number) => {
         const ping = echoes[number];
         const { x, y, direction } = placeOf(ping, scan, log);
-        const { range_m: range, margin_db: margin } = heard(ping);
+        const { range_m: range, margin_db: margin } = reading(ping);
         near(point.x, x + range * Math.cos(direction), 1e-5, `${topic}: x`);
         near(point.y, y + range * Math.sin(direction), 1e-5, `${topic}: y`);
         assert.equal(point.range, single(range));
@@ -209,7 +209,7 @@ function comparePoints(messages, log) {
         assert.equal(point.intensity, single(margin ?? NaN));
         const since = Number(nanoseconds(ping.time) - nanoseconds(scan.pings[0].time)) * 1e-9;
         near(point.time, since, 1e-5, `${topic}: time`);
-        assert.equal(point.order, (heard(ping).path ?? ping.sim?.path)?.order ?? -1, `${topic}: order`);
+        assert.equal(point.order, (reading(ping).path ?? ping.sim?.path)?.order ?? -1, `${topic}: order`);
       });
     });
   }
@@ -256,12 +256,12 @@ function compareMarkers(messages, log) {
   messages.get("/sonar/paths").forEach(({ message }, place) => {
     const lengths = { specular: 0, diffracted: 0, scattered: 0 };
     for (const ping of log.scans[place].pings) {
-      const heard = [ping, ping.sim ?? {}].find(({ path, status }) => path && ["echo", "min_range"].includes(status));
-      if (heard) lengths[heard.path.kind] += heard.path.length_m;
+      const reading = [ping, ping.sim ?? {}].find(({ path, status }) => path && ["echo", "min_range"].includes(status));
+      if (reading) lengths[reading.path.kind] += reading.path.length_m;
     }
     for (const marker of message.markers) {
       assert.deepEqual([marker.type, marker.header.frame_id], [5, "map"]);
-      // Points stand in the log to a micrometre.
+      // The log rounds points to a micrometre.
       near(length(marker), lengths[marker.ns], 1e-5 * Math.max(1, marker.points.length), marker.ns);
       assert.equal(marker.action, marker.points.length > 0 ? 0 : 2);
     }
@@ -275,7 +275,7 @@ function compareMarkers(messages, log) {
   assert.deepEqual(drawn, segments.flat());
 }
 
-/** The last map beside the image and description that `sonard map` makes of the log. */
+/** Compares the last map with the files that `sonard map` writes for the log. */
 function compareMap(messages) {
   const made = `${folder}-map`;
   execFileSync(program, ["map", folder, "--out", made], { stdio: "ignore" });
@@ -290,7 +290,7 @@ function compareMap(messages) {
   let known = 0;
   data.forEach((percent, place) => {
     const pixel = image[head.length + (height - 1 - Math.floor(place / width)) * width + (place % width)];
-    // In the image what is not known is in the middle; both round, to a 255th and to a hundredth.
+    // Unknown cells are 128 in the image; the image rounds to 1/255, the message to 1/100.
     if (percent === -1) assert.equal(pixel, 128, `cell ${place}`);
     else near(percent / 100, 1 - pixel / 255, 0.5 / 100 + 0.5 / 255 + 1e-9, `cell ${place}`);
     known += percent === -1 ? 0 : 1;
@@ -304,20 +304,24 @@ if (name === "watch") {
   await new Promise(() => {});
 }
 const viewers = ["foxglove.sdk.v1", "foxglove.websocket.v1"].map(connect);
-await until("the greeting", () => viewers.every((viewer) => viewer.info));
+await until("server information", () => viewers.every((viewer) => viewer.info));
 for (let scan = 0; scan <= SCANS; scan += 1) {
-  await ask("POST", "/v1/start", JSON.stringify({ scans: 1 }));
+  await request("POST", "/v1/start", JSON.stringify({ scans: 1 }));
   const whole = ({ messages }) => messages.get("/sonar/paths")?.length >= Math.max(1, scan);
-  await until("a scan", () => viewers.every(whole));
-  // Of the first scan, in which they came, they may lack readings; what stands still is told with it.
+  await until("paths of a scan", () => viewers.every(whole));
+  // The viewers connect during the first scan and may miss readings of it; static topics are published once.
   const isOfScan = (topic) => !["/tf_static", "/sonar/scene"].includes(topic);
   for (const { messages } of scan === 0 ? viewers : []) {
     [...messages.keys()].filter(isOfScan).forEach((topic) => messages.set(topic, []));
   }
 }
-await until("the log", () => readLog().scans.length > SCANS);
+await until("logged scans", () => readLog().scans.length > SCANS);
 const log = readLog();
 log.scans.shift();
+// The map of a scan is published after its paths.
+const lastStart = nanoseconds(log.scans.at(-1).start.time);
+const hasLastMap = ({ messages }) => messages.get("/map").some(({ message }) => stampOf(message.header.stamp) >= lastStart);
+await until("map of the last scan", () => viewers.every(hasLastMap));
 for (const viewer of viewers) {
   const { messages, info, words } = viewer;
   assert.deepEqual([info.capabilities, info.name.split(" ")[0]], [[], "sonard"]);
