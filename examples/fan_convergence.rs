@@ -1,8 +1,9 @@
-//! How the fan of rays comes closer to the exact paths as its rays do, in every shipped scene:
+//! Convergence of the fan of rays to the exact paths with its number of rays, in all shipped scenes:
 //! `cargo run --release --example fan_convergence -- PICTURE.png`.
 //!
-//! Both engines hear through the same ideal receiver, with Kuc and Siegel's law at edges and a face
-//! that reflects nothing, since the fan knows no other; so what differs is the geometry alone.
+//! Both engines use the same ideal receiver, Kuc and Siegel's edge law and a transducer face
+//! without reflection, the only ones that the fan supports, so the results differ by the geometry
+//! alone.
 
 use std::{error::Error, fs, sync::Arc};
 

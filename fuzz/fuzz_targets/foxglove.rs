@@ -1,5 +1,5 @@
-//! Any texts of a viewer, line by line: nothing panics, nothing is subscribed to that is not there,
-//! and no answer is longer than what it answers asks for.
+//! Arbitrary messages of a viewer, one per line: none panics or subscribes to a channel that does
+//! not exist, and responses are few and short.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

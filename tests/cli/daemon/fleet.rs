@@ -30,9 +30,9 @@ fn status_of_three_robots() {
     wait_until("three that are well", || fleet.states() == ["healthy", "healthy", "healthy"]);
     wait_until("pictures", || {
         let has = |one: &Value| one["report"]["last_scan"]["picture"]["points_m"].is_array();
-        fleet.told().iter().all(has)
+        fleet.reports().iter().all(has)
     });
-    let picture = &fleet.told()[1]["report"]["last_scan"]["picture"];
+    let picture = &fleet.reports()[1]["report"]["last_scan"]["picture"];
     assert!(picture["points_m"].as_array().expect("points").len() > 50, "{picture}");
     assert!(picture["walls_m"].as_array().expect("walls").len() >= 4, "{picture}");
     let output = fleet.status();
@@ -42,7 +42,7 @@ fn status_of_three_robots() {
     wait_until("the unplugged one", || fleet.states() == ["unhealthy", "healthy", "healthy"]);
     let output = fleet.status();
     assert_eq!(output.status.code(), Some(1), "{}", said(&output));
-    assert!(fleet.told()[0]["problems"][0].as_str().expect("why").contains("the link is"));
+    assert!(fleet.reports()[0]["problems"][0].as_str().expect("why").contains("the link is"));
 
     fleet.robots[1].take().expect("it runs").kill();
     wait_until("the killed one", || fleet.states() == ["unhealthy", "no_response", "healthy"]);
@@ -54,7 +54,7 @@ fn status_of_three_robots() {
     assert!(row("mango").contains("OFFLINE") && row("lime").contains('%'), "{table}");
     assert!(row("kiwi").contains("the link is"), "{table}");
     // What it was last is still there, and since when it is silent.
-    let mango = &fleet.told()[1];
+    let mango = &fleet.reports()[1];
     assert!(
         mango["last_report"].is_string() && mango["report"]["last_scan"].is_object(),
         "{mango}"
@@ -66,7 +66,7 @@ fn status_of_three_robots() {
     let named = ["--set", &listen, "--set", "fleet.robot=papaya"];
     let papaya = Daemon::start_mock(&elsewhere, &named);
     wait_until("another", || fleet.states() == ["unhealthy", "other_robot", "healthy"]);
-    assert_eq!(fleet.told()[1]["problems"][0], "papaya responds in place of mango");
+    assert_eq!(fleet.reports()[1]["problems"][0], "papaya responds in place of mango");
     assert_eq!(fleet.status().status.code(), Some(3));
     papaya.kill();
     wait_until("silence", || fleet.states() == ["unhealthy", "no_response", "healthy"]);
@@ -246,8 +246,8 @@ fn api_hides_tokens() {
     wait_until("the refusal", || {
         asking.get("/v1/fleet").json()["robots"][0]["state"] == "rejected"
     });
-    let told = String::from_utf8(asking.get("/v1/fleet").body).expect("text");
-    assert!(!told.contains(TOKEN) && !told.contains("token_file"), "{told}");
+    let body = String::from_utf8(asking.get("/v1/fleet").body).expect("text");
+    assert!(!body.contains(TOKEN) && !body.contains("token_file"), "{body}");
     assert!(!asking.said().contains(TOKEN), "{}", asking.said());
     for (host, origin, status) in [
         ("localhost", None, 200),

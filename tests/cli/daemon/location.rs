@@ -135,9 +135,10 @@ fn reasons_without_location() {
     assert!(refused.json()["error"].as_str().expect("words").contains("at least 8"));
     let course = daemon.get(&format!("/v1/scans/{scan}/course"));
     assert_eq!(course.status, 200);
-    let told: Location = serde_json::from_value(course.json()).expect("a location");
+    let location: Location = serde_json::from_value(course.json()).expect("a location");
     assert!(
-        told.poses.is_empty() && told.unavailable_reason.expect("words").contains("at least 8")
+        location.poses.is_empty()
+            && location.unavailable_reason.expect("words").contains("at least 8")
     );
 }
 

@@ -35,7 +35,7 @@ fn mqtt(daemon: &Daemon) -> Value {
 }
 
 fn wait_for_trouble(daemon: &Daemon, words: &str) {
-    wait_until(words, || mqtt(daemon)["error"].as_str().is_some_and(|told| told.contains(words)));
+    wait_until(words, || mqtt(daemon)["error"].as_str().is_some_and(|error| error.contains(words)));
 }
 
 /// What of the records tells one from another: a scan's by scan and index.

@@ -67,14 +67,14 @@ impl Fleet {
         }
     }
 
-    pub fn told(&self) -> Vec<Value> {
+    pub fn reports(&self) -> Vec<Value> {
         let fleet = self.asking.get("/v1/fleet").json();
         fleet["robots"].as_array().expect("robots").clone()
     }
 
     pub fn states(&self) -> Vec<String> {
         let state = |robot: &Value| robot["state"].as_str().expect("a state").to_owned();
-        self.told().iter().map(state).collect()
+        self.reports().iter().map(state).collect()
     }
 
     pub fn status(&self) -> Output {
