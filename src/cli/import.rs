@@ -87,7 +87,7 @@ for degrees, metres for centimetres), and constants that mean no echo (0, -1, 25
 sensor's maximum range). The same file always gives the same log.
 
 Scans are separated by the field `scan`, or else by the robot's position, or else where the \
-rotation reverses, jumps back or completes a revolution.
+rotation reverses, jumps back or completes a revolution. Readings in random order need --unordered.
 
 From a recording (MCAP, or a file or folder of rosbag2 in MCAP or SQLite) all sensor_msgs/Range \
 are read, or else LaserScan. /tf and /tf_static give the pose of the ranger at each reading; \

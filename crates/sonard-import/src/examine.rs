@@ -479,7 +479,7 @@ impl Imported {
         &'a self,
         mut readings: impl Iterator<Item = Result<ImportedReading, ImportError>> + 'a,
     ) -> Box<dyn Iterator<Item = ScanRecords> + 'a> {
-        let (mut splitter, mut number) = (Some(ScanSplitter::default()), 0);
+        let (mut splitter, mut number) = (Some(ScanSplitter::new(self.mapping.unordered)), 0);
         let mut ready = VecDeque::new();
         Box::new(std::iter::from_fn(move || {
             let scan = loop {

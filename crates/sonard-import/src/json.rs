@@ -6,11 +6,14 @@ use serde_json::Value;
 
 use crate::{
     Column, FileLocation, ImportError, Mapping, Row,
-    lines::{LineEnding, LineReader, TextLine},
+    lines::{LineEnding, LineReader, MaxLine, TextLine},
 };
 
 /// Maximum size of a document that is not JSON Lines.
 const MAX_DOCUMENT_BYTES: usize = 16 << 20;
+
+/// Advice for a longer document.
+const SPLIT_HELP: &str = "write one object per line: `jq -c '.[]' FILE > LINES`";
 
 /// Returns the rows of a JSON file: of a list of objects or lists, of a single object, or of one
 /// object per line. Lists in mapped members give one row per element, with scalar members repeated.
@@ -40,7 +43,9 @@ type Object = Result<Value, ImportError>;
 pub(crate) fn objects<'a>(
     source: impl Read + 'a,
 ) -> Result<Box<dyn Iterator<Item = Object> + 'a>, ImportError> {
-    let mut lines = LineReader::new(source, LineEnding::Lines);
+    // Programs write a document without line ends.
+    let max = MaxLine { bytes: MAX_DOCUMENT_BYTES, help: SPLIT_HELP };
+    let mut lines = LineReader::with_max(source, LineEnding::Lines, max);
     // A single line, or the beginning of a longer document.
     let mut text = String::new();
     let mut is_first = true;
@@ -54,7 +59,7 @@ pub(crate) fn objects<'a>(
                     "JSON document of more than {} MB, which is the limit without JSON Lines",
                     MAX_DOCUMENT_BYTES >> 20
                 ),
-                "write one object per line: `jq -c '.[]' FILE > LINES`",
+                SPLIT_HELP,
             ));
         }
         if line.trim().is_empty() {

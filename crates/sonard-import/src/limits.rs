@@ -1,7 +1,7 @@
 //! Classification of the ranges of LaserScan and Range messages by REP 117, the message definitions
 //! and the limits in each message.
 
-use sonard_model::reading::PingStatus;
+use sonard_model::{geometry::wrap_pi, reading::PingStatus};
 
 use crate::Mapping;
 
@@ -43,12 +43,46 @@ pub(crate) struct LimitNotes {
     max_stated: f64,
     /// Greatest magnitude of an angle, radians.
     max_angle_rad: f64,
+    scans: u64,
+    /// Number and first of the scans whose `angle_max` contradicts their ranges.
+    contradictions: u64,
+    first_contradiction: Option<ScanAngles>,
+}
+
+/// Angles of a LaserScan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ScanAngles {
+    pub(crate) first_rad: f64,
+    pub(crate) step_rad: f64,
+    /// `angle_max`, if the message has it.
+    pub(crate) max_rad: Option<f64>,
+    pub(crate) beams: usize,
+}
+
+impl ScanAngles {
+    /// Returns the direction of the last beam, radians.
+    fn last_rad(&self) -> f64 {
+        self.first_rad + self.beams.saturating_sub(1) as f64 * self.step_rad
+    }
+
+    /// Returns `true` if `angle_max` is more than one and a half steps from the last beam. Many
+    /// drivers state the end of the last step instead of the last beam.
+    fn contradicts_max(&self) -> bool {
+        let Some(max_rad) = self.max_rad.filter(|rad| rad.is_finite()) else { return false };
+        let last_rad = self.last_rad();
+        let off_rad = wrap_pi(max_rad - last_rad).abs();
+        last_rad.is_finite()
+            && self.beams > 1
+            && off_rad > 1.5 * self.step_rad.abs() + ANGLE_ROUNDING_RAD
+    }
 }
 
 /// Limit of any ultrasonic ranger, metres; a greater `max_range` is in another unit.
 pub(crate) const MAX_STATED_M: f64 = 60.0;
 /// Greatest plausible angle of a LaserScan, radians: a revolution, with rounding.
 const MAX_ANGLE_RAD: f64 = std::f64::consts::TAU + 0.1;
+/// Allowance for rounded angles of a LaserScan, radians.
+const ANGLE_ROUNDING_RAD: f64 = 2e-3;
 /// Number of ranges below which a robot may just be near a wall.
 const MIN_NEAR_READINGS: u64 = 4;
 
@@ -158,13 +192,32 @@ impl LimitNotes {
         if self.invalid > 0 {
             lines.push(format!("{} of {of} ranges are NaN: skipped as invalid", self.invalid));
         }
+        if let Some(angles) = self.first_contradiction {
+            let last_rad = angles.last_rad();
+            lines.push(format!(
+                "angle_max contradicts the number of ranges in {} of {} scans (first: angle_max = {:.3} rad, but {} ranges in \
+                 steps of {:.4} rad end at {last_rad:.3}): angle_min and angle_increment are used",
+                self.contradictions,
+                self.scans,
+                angles.max_rad.unwrap_or(last_rad),
+                angles.beams,
+                angles.step_rad
+            ));
+        }
         lines
     }
 
-    /// Counts a beam at this angle.
-    pub(crate) fn add_angle(&mut self, angle_rad: f64) {
-        if angle_rad.is_finite() {
-            self.max_angle_rad = self.max_angle_rad.max(angle_rad.abs());
+    /// Counts a LaserScan.
+    pub(crate) fn add_scan(&mut self, angles: ScanAngles) {
+        self.scans += 1;
+        for angle_rad in [angles.first_rad, angles.last_rad()] {
+            if angle_rad.is_finite() {
+                self.max_angle_rad = self.max_angle_rad.max(angle_rad.abs());
+            }
+        }
+        if angles.contradicts_max() {
+            self.contradictions += 1;
+            self.first_contradiction.get_or_insert(angles);
         }
     }
 

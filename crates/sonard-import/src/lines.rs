@@ -4,8 +4,15 @@ use std::io::{BufRead as _, BufReader, Read};
 
 use crate::{FileLocation, ImportError};
 
-/// Maximum length of a line.
-const MAX_LINE_BYTES: usize = 1 << 20;
+/// Maximum length of a line of a table or a log.
+const MAX_LINE: MaxLine = MaxLine { bytes: 1 << 20, help: "give a file with one reading per line" };
+
+/// Limit of the length of lines, with the advice for a longer one.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct MaxLine {
+    pub(crate) bytes: usize,
+    pub(crate) help: &'static str,
+}
 
 /// Record separator of a text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -38,6 +45,7 @@ impl TextLine {
 pub(crate) struct LineReader<R> {
     source: BufReader<R>,
     ends: LineEnding,
+    max: MaxLine,
     count: u64,
     /// True if the last ending was a carriage return, which a line feed may complete.
     is_after_return: bool,
@@ -45,7 +53,11 @@ pub(crate) struct LineReader<R> {
 
 impl<R: Read> LineReader<R> {
     pub(crate) fn new(source: R, ends: LineEnding) -> Self {
-        Self { source: BufReader::new(source), ends, count: 0, is_after_return: false }
+        Self::with_max(source, ends, MAX_LINE)
+    }
+
+    pub(crate) fn with_max(source: R, ends: LineEnding, max: MaxLine) -> Self {
+        Self { source: BufReader::new(source), ends, max, count: 0, is_after_return: false }
     }
 
     fn read(&mut self) -> Result<Option<TextLine>, ImportError> {
@@ -67,10 +79,10 @@ impl<R: Read> LineReader<R> {
             };
             let end = piece.iter().position(is_end);
             bytes.extend(&piece[..end.unwrap_or(piece.len())]);
-            if bytes.len() > MAX_LINE_BYTES {
-                let what = format!("longer than {MAX_LINE_BYTES} bytes");
-                let help = "give a file with one reading per line";
-                return Err(ImportError::at(FileLocation::Line(self.count + 1), what, help));
+            if bytes.len() > self.max.bytes {
+                let what = format!("longer than {} MB", self.max.bytes >> 20);
+                let place = FileLocation::Line(self.count + 1);
+                return Err(ImportError::at(place, what, self.max.help));
             }
             let used = end.map_or(piece.len(), |end| end + 1);
             self.is_after_return = end.is_some_and(|end| piece[end] == b'\r');

@@ -125,6 +125,10 @@ pub struct Mapping {
     /// for bearings, from the x axis.
     #[serde(skip_serializing_if = "is_zero")]
     pub zero_deg: f64,
+    /// True if the readings of a scan are in no order of direction: all readings at one pose are a
+    /// scan.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub unordered: bool,
     /// Range values for no echo, in the unit of the file.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub none: Vec<f64>,

@@ -27,7 +27,7 @@ use sonard_records::Record;
 use crate::{
     Assumptions, FileLocation, ImportError, Mapping,
     examine::check_messages,
-    limits::{LimitNotes, Limits, MAX_STATED_M, RangeClass},
+    limits::{LimitNotes, Limits, MAX_STATED_M, RangeClass, ScanAngles},
     unit_check::{RangeStats, UnitContext},
 };
 use cdr::{CdrError, CdrReader, Decoded};
@@ -299,10 +299,12 @@ impl Bag {
             false => None,
         };
         if let Some(scan) = &scan {
-            let last = scan.ranges_m.len().saturating_sub(1) as f64;
-            let (first_rad, step_rad) = (f64::from(scan.first_rad), f64::from(scan.step_rad));
-            notes.add_angle(first_rad);
-            notes.add_angle(first_rad + last * step_rad);
+            notes.add_scan(ScanAngles {
+                first_rad: f64::from(scan.first_rad),
+                step_rad: f64::from(scan.step_rad),
+                max_rad: Some(f64::from(scan.max_rad)),
+                beams: scan.ranges_m.len(),
+            });
         }
         let mut place = |time_ns: i64, turned_deg: f64, range: f32, limits: Limits| {
             let (status, raw) = match limits.classify(as_written(range), mapping, notes) {

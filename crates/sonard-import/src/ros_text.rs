@@ -12,8 +12,8 @@ use sonard_model::reading::PingStatus;
 
 use crate::{
     FileLocation, ImportError, ImportedReading, Mapping, json,
-    limits::{LimitNotes, Limits, RangeClass},
-    lines::{LineEnding, LineReader},
+    limits::{LimitNotes, Limits, RangeClass, ScanAngles},
+    lines::{LineEnding, LineReader, MaxLine},
     reading::RawReading,
     time::{MIN_CLOCK_S, TimeReader},
 };
@@ -29,7 +29,9 @@ pub(crate) fn messages<'a>(
     if is_json {
         return json::objects(source);
     }
-    let mut lines = LineReader::new(source, LineEnding::Lines);
+    // A list in YAML's flow style is one line.
+    let max = MaxLine { bytes: MAX_MESSAGE_BYTES, help: "messages end with a line `---`" };
+    let mut lines = LineReader::with_max(source, LineEnding::Lines, max);
     let mut number = 0;
     Ok(Box::new(std::iter::from_fn(move || {
         loop {
@@ -166,10 +168,12 @@ impl<'a> MessageConverter<'a> {
         let topic_scan = self.count.to_string();
         let beams = message.get("ranges").and_then(Value::as_array);
         if let Some(ranges) = beams {
-            let last = ranges.len().saturating_sub(1) as f64;
-            let angle = |name: &'static str| number(&[name]).unwrap_or(0.0);
-            self.notes.add_angle(angle("angle_min"));
-            self.notes.add_angle(angle("angle_min") + last * angle("angle_increment"));
+            self.notes.add_scan(ScanAngles {
+                first_rad: number(&["angle_min"]).unwrap_or(0.0),
+                step_rad: number(&["angle_increment"]).unwrap_or(0.0),
+                max_rad: number(&["angle_max"]),
+                beams: ranges.len(),
+            });
             self.notes.add_nulls(ranges.iter().filter(|range| range.is_null()).count());
         }
         let mut convert = |number: Option<u64>,

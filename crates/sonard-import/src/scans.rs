@@ -28,6 +28,8 @@ fn turn_deg(from_deg: f64, to_deg: f64) -> f64 {
 /// robot's pose or at the end of a sweep.
 #[derive(Debug, Default)]
 pub(crate) struct ScanSplitter {
+    /// True if directions have no order and do not end a scan.
+    is_unordered: bool,
     readings: Vec<ImportedReading>,
     sweep: SweepDetector,
     /// Scan that a full circle completed, with the sense of its rotation. The reading back at its
@@ -36,6 +38,10 @@ pub(crate) struct ScanSplitter {
 }
 
 impl ScanSplitter {
+    pub(crate) fn new(is_unordered: bool) -> Self {
+        Self { is_unordered, ..Self::default() }
+    }
+
     /// Adds the next reading and returns the scans that are complete.
     pub(crate) fn push(
         &mut self,
@@ -57,7 +63,7 @@ impl ScanSplitter {
     }
 
     fn push_to_sweep(&mut self, reading: ImportedReading) -> Option<Vec<ImportedReading>> {
-        let is_swept = self.sweep.is_next(reading.direction_deg);
+        let is_swept = !self.is_unordered && self.sweep.is_next(reading.direction_deg);
         let is_next = self.readings.last().is_some_and(|last| {
             let has_ids = reading.scan.is_some() && last.scan.is_some();
             !is_same_scan(last, &reading) || (is_swept && !has_ids)
@@ -87,7 +93,7 @@ impl ScanSplitter {
 }
 
 /// Returns `true` if two successive readings have equal scan identifiers, or else one pose.
-fn is_same_scan(last: &ImportedReading, next: &ImportedReading) -> bool {
+pub(crate) fn is_same_scan(last: &ImportedReading, next: &ImportedReading) -> bool {
     match (&last.scan, &next.scan) {
         (Some(last), Some(next)) => last == next,
         _ => (&last.position_m, &last.heading_deg) == (&next.position_m, &next.heading_deg),
@@ -228,25 +234,56 @@ fn scan_records(
     records
 }
 
-/// Returns the plan of these azimuths and the index of each azimuth in it. Unevenly spaced stops
-/// get a plan that only has the right number of beams.
+/// Returns the plan of these azimuths, in whatever order, and the index of each azimuth in it.
+/// Unevenly spaced stops get a plan that only has the right number of beams.
 fn plan(azimuths: &[f64]) -> (ScanPlan, Vec<u32>) {
+    let (order, sorted) = by_direction(azimuths);
+    ordered_plan(azimuths)
+        .or_else(|| {
+            let (plan, places) = ordered_plan(&sorted)?;
+            let mut indices = vec![0; places.len()];
+            for (at, place) in order.into_iter().zip(places) {
+                indices[at] = place;
+            }
+            Some((plan, indices))
+        })
+        .unwrap_or_else(|| (counting_plan(azimuths.len()), (0..azimuths.len() as u32).collect()))
+}
+
+/// Returns the order of azimuths counter-clockwise from the end of their greatest gap, and the
+/// azimuths in that order.
+fn by_direction(azimuths: &[f64]) -> (Vec<usize>, Vec<f64>) {
+    let mut order: Vec<usize> = (0..azimuths.len()).collect();
+    order.sort_by(|a, b| azimuths[*a].total_cmp(&azimuths[*b]));
+    let gap_deg = |at: usize| {
+        let before = order[(at + order.len() - 1) % order.len()];
+        wrap_360(azimuths[order[at]] - azimuths[before])
+    };
+    let first = (0..order.len()).rev().max_by(|a, b| gap_deg(*a).total_cmp(&gap_deg(*b)));
+    order.rotate_left(first.unwrap_or(0));
+    let sorted = order.iter().map(|at| azimuths[*at]).collect();
+    (order, sorted)
+}
+
+/// Returns the plan of evenly spaced azimuths in the order of their directions, and the index of
+/// each azimuth in it.
+fn ordered_plan(azimuths: &[f64]) -> Option<(ScanPlan, Vec<u32>)> {
     let count = azimuths.len();
     let steps = || azimuths.windows(2).map(|pair| turn_deg(pair[0], pair[1]));
     let mean = steps().sum::<f64>() / (count - 1).max(1) as f64;
     let is_even = steps().all(|step| (step - mean).abs() < EVEN_DEG);
     let span_deg = mean.abs() * count as f64;
     if !is_even || mean.abs() < EVEN_DEG || span_deg > 360.0 + EVEN_DEG {
-        return (counting_plan(count), (0..count as u32).collect());
+        return None;
     }
     let from_deg = if mean > 0.0 { azimuths[0] } else { azimuths[count - 1] };
     let to_deg = from_deg + span_deg.min(360.0);
     let plan = ScanPlan { from_deg, to_deg, step_deg: mean.abs(), pings_per_stop: 1 };
     if plan.beams() != count as u32 {
-        return (counting_plan(count), (0..count as u32).collect());
+        return None;
     }
     let indices = 0..count as u32;
-    (plan, if mean > 0.0 { indices.collect() } else { indices.rev().collect() })
+    Some((plan, if mean > 0.0 { indices.collect() } else { indices.rev().collect() }))
 }
 
 fn counting_plan(count: usize) -> ScanPlan {

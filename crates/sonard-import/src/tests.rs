@@ -3,6 +3,7 @@
 mod headers;
 mod messages;
 mod no_echo;
+mod order;
 mod ros_text;
 mod tables;
 mod texts;

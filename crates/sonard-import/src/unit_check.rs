@@ -2,6 +2,7 @@
 
 mod angles;
 mod echo_positions;
+mod order;
 mod sweep;
 
 use angles::AngleStats;

@@ -24,7 +24,7 @@ pub(super) struct ColumnArgs {
     #[arg(long, value_name = "FORMAT", value_parser = format())]
     format: Option<Format>,
     /// File (TOML) with these settings; keys: format, columns, topics, device, clockwise, zero_deg,
-    /// azimuth_deg, none, none_from, sound_speed_m_s, range_unit, decimal, encoding, time_format,
+    /// azimuth_deg, unordered, none, none_from, sound_speed_m_s, range_unit, decimal, encoding, time_format,
     /// utc_offset, started. Options take precedence
     #[arg(long, value_name = "FILE")]
     mapping: Option<PathBuf>,
@@ -47,6 +47,9 @@ pub(super) struct ColumnArgs {
     /// whose file has no such column
     #[arg(long, value_name = "DEG", allow_negative_numbers = true)]
     azimuth_deg: Option<f64>,
+    /// Readings of a scan are in no order of direction: all readings at one pose are a scan
+    #[arg(long)]
+    unordered: bool,
     /// Range, in the file's unit, that means no echo (repeatable)
     #[arg(long, alias = "none", value_name = "VALUE", allow_negative_numbers = true)]
     no_echo: Vec<f64>,
@@ -110,6 +113,7 @@ impl ColumnArgs {
             mapping.topics.clone_from(&self.topic);
         }
         mapping.clockwise |= self.clockwise;
+        mapping.unordered |= self.unordered;
         mapping.zero_deg = self.zero_deg.unwrap_or(mapping.zero_deg);
         mapping.azimuth_deg = self.azimuth_deg.or(mapping.azimuth_deg);
         if !self.no_echo.is_empty() {

@@ -52,6 +52,7 @@ impl RangeMessage {
 pub(crate) struct LaserScanMessage {
     pub(crate) header: MessageHeader,
     pub(crate) first_rad: f32,
+    pub(crate) max_rad: f32,
     pub(crate) step_rad: f32,
     pub(crate) time_increment_s: f32,
     pub(crate) limits_m: [f32; 2],
@@ -61,11 +62,11 @@ pub(crate) struct LaserScanMessage {
 impl LaserScanMessage {
     pub(crate) fn decode(cdr: &mut CdrReader<'_>) -> Decoded<Self> {
         let header = MessageHeader::decode(cdr)?;
-        let [first_rad, _last, step_rad] = [cdr.f32()?, cdr.f32()?, cdr.f32()?];
+        let [first_rad, max_rad, step_rad] = [cdr.f32()?, cdr.f32()?, cdr.f32()?];
         let [time_increment_s, _whole] = [cdr.f32()?, cdr.f32()?];
         let limits_m = [cdr.f32()?, cdr.f32()?];
         let ranges_m = cdr.list(CdrReader::f32)?;
-        Ok(Self { header, first_rad, step_rad, time_increment_s, limits_m, ranges_m })
+        Ok(Self { header, first_rad, max_rad, step_rad, time_increment_s, limits_m, ranges_m })
     }
 }
 

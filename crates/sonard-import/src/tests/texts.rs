@@ -160,3 +160,23 @@ fn notes_assumptions_on_times() {
         pings(&records).iter().filter_map(|ping| ping.time).map(|time| time.to_string()).collect();
     assert_eq!(times, ["2020-01-01T00:00:00Z", "2020-01-01T00:00:00.2Z"]);
 }
+
+/// `json.dump` writes a document without line ends.
+#[test]
+fn reads_a_long_json_document_in_one_line() {
+    let document = |count: usize| {
+        let entry =
+            |at: usize| format!(r#"{{"angle_deg":{},"distance_cm":{}}}"#, at % 360, 100 + at % 90);
+        format!("[{}]", (0..count).map(entry).collect::<Vec<_>>().join(","))
+    };
+    let text = document(60_000);
+    assert!(text.len() > 2 << 20);
+    let found = examine(text.as_bytes(), Mapping::default(), assumptions()).expect("a document");
+    assert_eq!(found.readings, 60_000);
+    let wrapped = format!(r#"{{"data":{text}}}"#);
+    let found = examine(wrapped.as_bytes(), Mapping::default(), assumptions()).expect("wrapped");
+    assert_eq!(found.readings, 60_000);
+    let longer = document(500_000);
+    let error = error_text(examine(longer.as_bytes(), Mapping::default(), assumptions()));
+    assert!(error.contains("longer than 16 MB") && error.contains("jq -c"), "{error}");
+}

@@ -5,6 +5,7 @@ use super::{
     angles::{AngleStats, MAX_RAD},
     echo_positions::EchoPositions,
     implausible,
+    order::SweepOrder,
 };
 use crate::{
     Assumptions, FieldQuantity, ImportError, ImportedReading, mapping::columns_option,
@@ -25,6 +26,7 @@ pub(crate) struct SweepStats {
     places: EchoPositions,
     /// The same, with directions from the x axis for a robot with a heading.
     turned_places: EchoPositions,
+    order: SweepOrder,
 }
 
 impl SweepStats {
@@ -35,6 +37,7 @@ impl SweepStats {
             headings: AngleStats::default(),
             places: EchoPositions::default(),
             turned_places: EchoPositions::default(),
+            order: SweepOrder::default(),
         }
     }
 
@@ -47,6 +50,7 @@ impl SweepStats {
             units,
         );
         self.directions.add(reading.raw.direction);
+        self.order.add(reading);
         if let Some(heading_deg) = reading.heading_deg {
             self.headings.add(heading_deg);
         }
@@ -73,6 +77,7 @@ impl SweepStats {
             self.check_angles(units)?;
             self.check_headings(units)?;
             self.check_places(units)?;
+            self.order.check(units)?;
         }
         self.ranges.check(units, assumptions)
     }
