@@ -146,10 +146,16 @@ fn included_models() {
         "{:?}",
         scene.walls
     );
-    // A file above the size limit is rejected with its name, included or not.
-    let large = "x".repeat((64 << 20) + 1);
-    fs::write(folder.path().join("shelf/model.sdf"), &large).expect("writable");
-    refused(&["scene", "from-sdf", path.to_str().expect("a plain path")], "model.sdf");
+    // An unreadable model is reported with its path and the reason, a world is rejected with it.
+    let large = "x".repeat((16 << 20) + 1);
+    for (content, why) in [
+        (large.as_bytes(), "model.sdf: the file is larger than 16 MB"),
+        (b"<sdf><model></sdf>", "model.sdf: invalid XML"),
+        (b"<sdf version='1.6'/>", "model.sdf: no model"),
+    ] {
+        fs::write(folder.path().join("shelf/model.sdf"), content).expect("writable");
+        refused(&["scene", "from-sdf", path.to_str().expect("a plain path")], why);
+    }
     fs::write(&path, &large).expect("writable");
     refused(&["scene", "from-sdf", path.to_str().expect("a plain path")], "larger than 16 MB");
     // Not what is outside its folder.

@@ -1,6 +1,9 @@
 //! Models included by a world.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fmt::Display,
+    path::{Path, PathBuf},
+};
 
 use roxmltree::Node;
 
@@ -39,16 +42,29 @@ impl World<'_> {
         let text = |name: &str| child(include, name).and_then(|node| node.text()).map(str::trim);
         let uri = text("uri").unwrap_or_default();
         if self.depth == MAX_DEPTH || self.includes == MAX_INCLUDES {
-            return self.ignore(uri);
+            let what = format!(
+                "ignored: the model `{uri}`: more than {MAX_DEPTH} nested or {MAX_INCLUDES} included files"
+            );
+            return self.ignore(what);
         }
         self.includes += 1;
         let Some((path, bytes)) = self.library.model(uri, self.file.as_deref()) else {
-            return self.ignore(uri);
+            return self.ignore(format!(
+                "ignored: the model `{uri}`; put its folder next to the world to include it"
+            ));
         };
-        let Ok(file) = xml::text(&bytes, "") else { return self.ignore(uri) };
-        let Ok(document) = xml::parse(&file, "") else { return self.ignore(uri) };
+        let ignored =
+            |why: &dyn Display| format!("ignored: the model `{uri}`: {}: {why}", path.display());
+        let file = match xml::text(&bytes, "") {
+            Ok(file) => file,
+            Err(error) => return self.ignore(ignored(&error)),
+        };
+        let document = match xml::parse(&file, "") {
+            Ok(document) => document,
+            Err(error) => return self.ignore(ignored(&error)),
+        };
         let Some(model) = document.descendants().find(|node| node.has_tag_name("model")) else {
-            return self.ignore(uri);
+            return self.ignore(ignored(&"no model"));
         };
         let own = text("name").or_else(|| model.attribute("name"));
         let name = own.unwrap_or("body").to_owned();
@@ -76,11 +92,9 @@ impl World<'_> {
         added
     }
 
-    fn ignore(&mut self, uri: &str) -> Added {
+    fn ignore(&mut self, note: String) -> Added {
         self.found.count_ignored("models from elsewhere (include)");
-        self.notes.push(format!(
-            "ignored: the model `{uri}`; put its folder next to the world to include it"
-        ));
+        self.notes.push(note);
         Ok(())
     }
 }
