@@ -82,7 +82,7 @@ fn error(scene: &Scene, spacing_deg: f64) -> Result<f64, Box<dyn Error>> {
     Ok(differ as f64 / all.max(1) as f64)
 }
 
-/// How many of the echoes above the threshold are not among others, those below it included.
+/// Counts the echoes above the threshold that are not among others, including those below it.
 fn lacks(echoes: &[Arrival], others: &[Arrival]) -> usize {
     let known = |echo: &&Arrival| others.iter().any(|other| is_same(echo, other));
     echoes.iter().filter(|echo| is_loud(echo) && !known(echo)).count()

@@ -2,8 +2,8 @@
 //! `tests/golden/predictions.jsonl`.
 //!
 //! The file is no proof that a reading is right (laws, closed forms and full waves are): it holds that a
-//! change which is meant to move code moves no reading. Where a reading changes on purpose, CHANGELOG.md says
-//! so and `SONARD_GOLDEN=write cargo test --test golden` writes the file anew.
+//! change which is meant to move code moves no reading. Where a reading changes on purpose, CHANGELOG.md states
+//! it and `SONARD_GOLDEN=write cargo test --test golden` rewrites the file.
 
 use std::{fmt::Write as _, sync::Arc};
 
@@ -28,7 +28,7 @@ struct Turn {
     pose: String,
     sensor: String,
     engine: EngineKind,
-    /// One letter a beam: the first of the status.
+    /// First letter of the status of each beam.
     status: String,
     range_m: Vec<Option<f64>>,
     length_m: Vec<Option<f64>>,
@@ -58,11 +58,11 @@ impl Turn {
         }
     }
 
-    /// What differs from `kept`, a line a beam.
-    fn differences(&self, kept: &Self, said: &mut String) {
+    /// Lists the differences from `kept`, a line for each beam.
+    fn differences(&self, kept: &Self, printed: &mut String) {
         for (beam, (is, was)) in self.status.chars().zip(kept.status.chars()).enumerate() {
             if is != was {
-                let _ = writeln!(said, "{} beam {beam}: status {was} is now {is}", self.name());
+                let _ = writeln!(printed, "{} beam {beam}: status {was} is now {is}", self.name());
             }
         }
         let level_db = |amplitude: f64| 20.0 * amplitude.log10();
@@ -76,7 +76,7 @@ impl Turn {
                     };
                     if apart {
                         let _ = writeln!(
-                            said,
+                            printed,
                             "{} beam {beam}: {what} {:?} is now {:?}",
                             self.name(),
                             pair.1,
@@ -134,12 +134,12 @@ fn check(scene: &str) {
         .collect();
     let turns = turns(scene, text);
     assert_eq!(turns.len(), kept.len(), "{scene}: scenes, poses, sensors or engines came or went");
-    let mut said = String::new();
+    let mut printed = String::new();
     for (turn, kept) in turns.iter().zip(&kept) {
         assert_eq!(turn.name(), kept.name());
-        turn.differences(kept, &mut said);
+        turn.differences(kept, &mut printed);
     }
-    assert!(said.is_empty(), "{said}");
+    assert!(printed.is_empty(), "{printed}");
 }
 
 macro_rules! scenes {

@@ -17,7 +17,7 @@ use sonard::{
 };
 
 const LOG: &str = include_str!("fixtures/small.jsonl");
-/// Tells this test binary, started again, to be the process that writes.
+/// Environment variable that turns this test binary into the writing process.
 const CHILD: &str = "SONARD_TEST_WRITES_LOG";
 
 /// A reading that carries its number.
@@ -72,8 +72,8 @@ fn child(log: &Path) -> Command {
 }
 
 /// The last number reported as synced.
-fn last_synced<'a>(said: impl Iterator<Item = &'a str>) -> u64 {
-    said.filter_map(|line| line.strip_prefix("synced ")?.parse().ok()).last().unwrap_or(0)
+fn last_synced<'a>(printed: impl Iterator<Item = &'a str>) -> u64 {
+    printed.filter_map(|line| line.strip_prefix("synced ")?.parse().ok()).last().unwrap_or(0)
 }
 
 #[test]
@@ -85,17 +85,17 @@ fn killed_at_any_moment_every_synced_record_is_there() {
         let log = folder.path().join(format!("{round}.jsonl"));
         let mut process = child(&log).spawn().expect("it starts");
         // Not before it writes: its first report.
-        let mut said = BufReader::new(process.stdout.take().expect("piped"));
+        let mut printed = BufReader::new(process.stdout.take().expect("piped"));
         let mut lines = Vec::new();
         while !lines.iter().any(|line: &String| line.starts_with("synced")) {
             let mut line = String::new();
-            assert!(said.read_line(&mut line).expect("it reports") > 0, "{lines:?}");
+            assert!(printed.read_line(&mut line).expect("it reports") > 0, "{lines:?}");
             lines.push(line.trim_end().to_owned());
         }
         std::thread::sleep(Duration::from_micros(random.random_range(0..20_000)));
         process.kill().expect("it still runs");
         assert_eq!(process.wait().expect("it ends").signal(), Some(9));
-        lines.extend(said.lines().map_while(Result::ok));
+        lines.extend(printed.lines().map_while(Result::ok));
         let synced = last_synced(lines.iter().map(String::as_str));
         repair(&log).expect("it can be repaired");
         let kept = numbers(&log);
@@ -120,13 +120,13 @@ fn where_the_disk_ends_no_half_record_stays() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = folder.path().join("scan.jsonl");
     let output = limited(&log, "trap '' XFSZ;");
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(output.status.success(), "{said}");
-    let failed = said.lines().find(|line| line.starts_with("failed")).expect("the disk ends");
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{printed}");
+    let failed = printed.lines().find(|line| line.starts_with("failed")).expect("the disk ends");
     assert!(failed.contains("scan.jsonl") && failed.contains("file-size limit"), "{failed}");
     assert!(fs::read(&log).expect("it is there").ends_with(b"\n"));
     let kept = numbers(&log);
-    assert!(kept.len() > 20 && kept.len() as u64 == last_synced(said.lines()), "{said}");
+    assert!(kept.len() > 20 && kept.len() as u64 == last_synced(printed.lines()), "{printed}");
 }
 
 #[test]
@@ -139,7 +139,7 @@ fn killed_in_the_middle_of_a_record_only_that_one_is_lost() {
     let before = fs::read(&log).expect("it is there");
     assert!(!before.ends_with(b"\n"), "the last record is torn");
     let whole = before.iter().rposition(|&byte| byte == b'\n').expect("many lines") + 1;
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
     let mut writer = LogWriter::open(&log).expect("it is mended");
     let torn = folder.path().join("scan.jsonl.torn-1");
     assert_eq!(
@@ -155,6 +155,6 @@ fn killed_in_the_middle_of_a_record_only_that_one_is_lost() {
     assert_eq!(fs::read(torn).expect("it is kept"), before[whole..]);
     assert!(fs::read(&log).expect("it is there").starts_with(&before[..whole]));
     let kept = numbers(&log);
-    assert!(kept.len() as u64 > last_synced(said.lines()));
+    assert!(kept.len() as u64 > last_synced(printed.lines()));
     assert_eq!(kept.last(), Some(&u64::MAX));
 }

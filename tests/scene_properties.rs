@@ -8,7 +8,7 @@ use sonard::{
     scene::{Scene, shipped},
 };
 
-/// What must hold for every text.
+/// Properties of every text.
 fn check(text: &str) -> Result<(), TestCaseError> {
     match Scene::from_json(text) {
         Ok(scene) => keeps_the_rules(&scene),

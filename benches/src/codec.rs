@@ -1,4 +1,4 @@
-//! How many frames a second the codec and the host machine get through.
+//! Throughput of the codec and the host machine, frames per second.
 
 use std::hint::black_box;
 

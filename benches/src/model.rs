@@ -22,7 +22,7 @@ fn simulator(engine: EngineKind) -> (Simulator, Pose) {
     (simulator, pose)
 }
 
-/// One firing from an observation point not seen before: the search and one weighting.
+/// A firing from a new observation point: path search and one weighting.
 fn ping(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("ping");
     group.throughput(Throughput::Elements(1)).sample_size(20);
@@ -51,7 +51,7 @@ fn scan(criterion: &mut Criterion) {
     group.finish();
 }
 
-/// What a new sensor or temperature costs before the first ping.
+/// Cost of a new sensor or temperature before the first ping.
 fn beam(criterion: &mut Criterion) {
     let sensor = Sensor::preset("senscomp-6500").expect("a preset");
     criterion.bench_function("beam pattern", |bencher| {

@@ -72,20 +72,20 @@ fn small_room() {
         Paths::new(&scene, paths.path_settings()).enumerate(pose.position()).expect("few paths");
     let place = engine.arrivals_at(pose.position()).expect("few paths");
     let mut sounds = Vec::new();
-    let mut heard = 0;
+    let mut received = 0;
     let listen = time(|| {
-        heard = 0;
+        received = 0;
         for i in 0..400 {
             place.collect_arrivals(f64::from(i) * TAU / 400.0, &mut sounds);
-            heard += sounds.len();
+            received += sounds.len();
         }
     });
     report("paths, listening 400 times to all of them", listen, None);
-    println!("  {} echo paths, {:.1} sounds a ping", echoes.len(), heard as f64 / 400.0);
+    println!("  {} echo paths, {:.1} sounds a ping", echoes.len(), received as f64 / 400.0);
     fans(&scene, &paths, &pose, range, exact);
 }
 
-/// The same scan by fans of rays.
+/// A scan by fans of rays.
 fn fans(scene: &Arc<Scene>, paths: &Simulator, pose: &Pose, range: Options, exact: Time) {
     // The fan knows neither pulses nor the face: it is held to what is left of the same paths.
     let faceless = Sensor { face: None, ..paths.sensor().clone() };
@@ -118,8 +118,8 @@ fn fans(scene: &Arc<Scene>, paths: &Simulator, pose: &Pose, range: Options, exac
     }
 }
 
-/// The paper's appendix A as printed: rays over the whole circle for each direction anew, up to
-/// the first that is heard.
+/// The paper's appendix A as printed: rays over the whole circle for each direction, up to
+/// the first detected one.
 struct PrintedFan {
     fan: Fan,
     shortest_m: f64,
@@ -155,7 +155,7 @@ impl PrintedFan {
         (0..FULL_SCAN.beams()).map(range_m).collect()
     }
 
-    /// How many of the echoes that there are it misses or puts a millimetre off, and how many
+    /// Counts the echoes that are missed or off by a millimetre, and those
     /// there are. It knows no minimum range.
     fn readings_off(&self, pose: &Pose, truth: &[Prediction]) -> (usize, usize) {
         let echoes = |prediction: &Prediction| prediction.status == PingStatus::Echo;
@@ -169,7 +169,7 @@ impl PrintedFan {
     }
 }
 
-/// The same room with a round robot body: the worst case, a cylinder that nearly all beams meet.
+/// The room with a round robot body: the worst case, a cylinder that nearly all beams meet.
 fn robot_room() {
     let text = shipped::text("simple-room-robot").expect("a shipped scene");
     let scene = Scene::from_json(text).expect("a valid scene");
@@ -196,7 +196,7 @@ fn robot_room() {
     }
 }
 
-/// How many readings of one differ from the other's by more than a millimetre, or are silent where
+/// Counts the readings that differ by more than a millimetre, or have no echo where
 /// it is not.
 fn readings_off(one: &Simulator, other: &Simulator, pose: &Pose) -> usize {
     let readings = one
@@ -276,10 +276,10 @@ fn building_plans() {
         report("paths: a ping's share of it", scan.each_of(400), None);
         report("parry: 15 ray casts", cast, Some(scan.each_of(400)));
         let point = model.at(poses[0]);
-        let heard: usize = (0..400)
+        let received: usize = (0..400)
             .map(|i| point.arrivals(f64::from(i) * TAU / 400.0).map_or(0, |all| all.len()))
             .sum();
-        println!("  {:.1} sounds a ping", heard as f64 / 400.0);
+        println!("  {:.1} sounds a ping", received as f64 / 400.0);
     }
 }
 

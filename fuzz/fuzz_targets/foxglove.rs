@@ -15,8 +15,8 @@ fuzz_target!(|bytes: &[u8]| {
         };
         assert!(steps.len() <= 10, "{steps:?}");
         for step in &steps {
-            if let ViewerAction::SendText(said) = step {
-                assert!(said.len() < 2000, "{said}");
+            if let ViewerAction::SendText(text) = step {
+                assert!(text.len() < 2000, "{text}");
             }
         }
         let channels: Vec<u32> = session.channels().collect();

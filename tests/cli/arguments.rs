@@ -3,7 +3,7 @@
 use std::{ffi::OsStr, fs, os::unix::ffi::OsStrExt as _};
 
 use crate::{
-    collect::said,
+    collect::printed,
     common::{run, sonard, stderr},
 };
 
@@ -25,7 +25,11 @@ fn non_utf8_paths() {
         let output = sonard(&["run", "--check", "--mock", option]).arg(&scene).output();
         let output = output.expect("starts");
         assert_eq!(output.status.code(), Some(2));
-        assert!(said(&output).contains(&format!("{option}: ")), "{}", said(&output));
+        assert!(
+            joined_stderr(&output).contains(&format!("{option}: ")),
+            "{}",
+            joined_stderr(&output)
+        );
     }
 }
 
@@ -40,7 +44,7 @@ fn too_many_cells() {
         let out = folder.path().join("map");
         let out = out.to_str().expect("plain path");
         let map = run(&["map", log, "--out", out, "--resolution", resolution]);
-        let text = said(&map);
+        let text = joined_stderr(&map);
         assert_eq!(map.status.code(), Some(2), "{text}");
         assert!(text.contains("more than 10^12 cells are too many"), "{text}");
     }

@@ -86,7 +86,7 @@ fn crosstalk() {
             assert!((path_m - gone_m - seems_m).abs() < 0.03, "{ping}");
         }
     }
-    // What is predicted again is the same, and nobody hears anybody where that is left out.
+    // Repeated predictions are equal, and without crosstalk no ranger detects another.
     let again = folder.path().join("again.jsonl").to_str().expect("plain path").to_owned();
     let predicted = run(&["predict", &hasty_log, "--scene", "mcgill-lab", "-o", &again]);
     assert!(predicted.status.success(), "{}", stderr(&predicted));
@@ -106,7 +106,7 @@ fn crosstalk() {
     assert_eq!(rangers, ["s3", "s4", "s0", "s1", "s7"]);
     let end = log.of_type("scan_end").next().expect("an end");
     assert_eq!(end["duration_s"], 0.12, "three turns of 40 ms");
-    for (wrong, said) in [
+    for (wrong, printed) in [
         (r#""firing_order": [[]], "rangers": ["#, "firing_order[0] is an empty list"),
         (
             r#""firing_order": ["s1", ["s2", "s2"]], "rangers": ["#,
@@ -118,7 +118,7 @@ fn crosstalk() {
         let file = write("wrong.json", shipped.replace("\"rangers\": [", wrong));
         let output = run(&[&["simulate"], &place[..], &[&file]].concat());
         assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
-        assert!(stderr(&output).contains(said), "{} lacks {said}", stderr(&output));
+        assert!(stderr(&output).contains(printed), "{} lacks {printed}", stderr(&output));
     }
 }
 
@@ -172,8 +172,8 @@ fn plot_map_and_lines() {
     // Arcs of constant depth need one ranger that turns.
     let refused = run(&["interpret", &eight]);
     assert_eq!(refused.status.code(), Some(2));
-    let said = stderr(&refused);
-    assert!(said.contains("of an array") && said.contains("sonard lines"), "{said}");
+    let message = stderr(&refused);
+    assert!(message.contains("of an array") && message.contains("sonard lines"), "{message}");
     assert!(run(&["lines", &ring, "--json"]).status.success());
 }
 
@@ -252,12 +252,12 @@ fn wrong_arrays() {
     ] {
         let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
         let output = run(&arguments);
-        let said = stderr(&output).replace(['\n', '\u{2502}'], " ");
-        let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        let printed = stderr(&output).replace(['\n', '\u{2502}'], " ");
+        let printed = printed.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {printed}");
         for part in parts {
-            assert!(said.contains(part), "{arguments:?}: {part:?} is not in: {said}");
+            assert!(printed.contains(part), "{arguments:?}: {part:?} is not in: {printed}");
         }
-        assert!(!said.contains("panicked"), "{said}");
+        assert!(!printed.contains("panicked"), "{printed}");
     }
 }

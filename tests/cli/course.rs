@@ -63,13 +63,13 @@ fn invalid_poses_are_skipped() {
     fs::write(&path, lines).expect("writes");
     let path = path.to_str().expect("plain path");
     let output = run(&["simulate", "--scene", "simple-room", "--poses", path]);
-    let said = stderr(&output);
-    assert_eq!(output.status.code(), Some(1), "{said}");
+    let printed = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{printed}");
     assert_eq!(String::from_utf8_lossy(&output.stdout).matches("scan_end").count(), 2);
     for part in
         ["trajectory.jsonl:2: ", "outside", "trajectory.jsonl:3: ", "x_m is", "2 of 4 poses"]
     {
-        assert!(said.contains(part), "{part}: {said}");
+        assert!(printed.contains(part), "{part}: {printed}");
     }
     // With none left there is nothing to do.
     fs::write(folder.path().join("none.csv"), "x_m,y_m,heading_deg\n9,9,0\n").expect("writes");
@@ -77,8 +77,8 @@ fn invalid_poses_are_skipped() {
     let none = none.to_str().expect("plain path");
     let output = run(&["simulate", "--scene", "simple-room", "--poses", none]);
     assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0));
-    let said = stderr(&output);
-    assert!(said.contains("none.csv:2: ") && said.contains("outside"), "{said}");
+    let printed = stderr(&output);
+    assert!(printed.contains("none.csv:2: ") && printed.contains("outside"), "{printed}");
 }
 
 #[test]

@@ -106,7 +106,7 @@ fn clock_rate() {
     let (code, report) = doctor(mock.port(), &options);
     assert_eq!((findings(&report), code), (vec![], Some(0)), "{report:#}");
     assert_eq!(report["checks"][6]["status"], "ok", "{report:#}");
-    for (rate, said) in [(0_u32, "is stopped"), (2, "2.0")] {
+    for (rate, printed) in [(0_u32, "is stopped"), (2, "2.0")] {
         let change = move |reply: &mut Reply| {
             if let Reply::StatusReport(status) = reply {
                 status.ticks = status.ticks.wrapping_mul(rate);
@@ -119,7 +119,10 @@ fn clock_rate() {
         // The host may reject readings of such a clock, too.
         let expected = ["clock clock failed", "echo device failed"];
         assert!(found.iter().all(|finding| expected.contains(&&**finding)), "{report:#}");
-        assert!(report["checks"][6]["detail"].as_str().expect("text").contains(said), "{report:#}");
+        assert!(
+            report["checks"][6]["detail"].as_str().expect("text").contains(printed),
+            "{report:#}"
+        );
         assert_eq!(code, Some(1));
     }
 }
@@ -132,7 +135,7 @@ fn impossible_and_scattered_echoes() {
     type Echo = fn(u32) -> u32;
     let cases: [(Echo, &[&str]); 3] = [
         (|_| 12, &["echo_time"]),
-        // A host that refuses such a reading on the line says so as well.
+        // The host may reject such a reading as well.
         (|_| 2_000_000, &["echo_time", "device"]),
         (|firing| 8_000 + firing % 10 * 900, &["scatter"]),
     ];
@@ -175,8 +178,8 @@ fn missed_steps() {
     assert_eq!(code, Some(1));
 }
 
-/// A port at which something else speaks, or nobody.
-fn stranger(says: &'static [u8]) -> (Option<i32>, Value) {
+/// A port with another device, or a silent one.
+fn stranger(has_text: &'static [u8]) -> (Option<i32>, Value) {
     let pty = Pty::open(None).expect("a pty");
     let port = pty.path().to_str().expect("plain path").to_owned();
     let stop = Arc::new(AtomicBool::new(false));
@@ -189,8 +192,8 @@ fn stranger(says: &'static [u8]) -> (Option<i32>, Value) {
                 Ok(_) => {}
                 Err(error) => assert_eq!(error.kind(), ErrorKind::WouldBlock),
             }
-            // A full pty loses what nobody reads.
-            drop(pty.write(says));
+            // A full pty drops unread bytes.
+            drop(pty.write(has_text));
         }
     });
     let found = doctor(&port, &[]);
@@ -204,14 +207,14 @@ fn no_reply_and_other_firmware() {
     let (code, report) = stranger(b"");
     assert_eq!(findings(&report), ["board silent failed"], "{report:#}");
     assert_eq!(code, Some(3));
-    for (says, cause, name) in [
+    for (has_text, cause, name) in [
         (&b"$GPGGA,123519,4807.038,N,01131.000,E*47\r\n"[..], "wrong_firmware", "GPS"),
         (b"\r\nDebian GNU/Linux robot ttyS0\r\n\r\nrobot login: ", "login_prompt", "robot login:"),
         (b"AT\r\nAT+GCAP\r\n", "modem", "modem commands"),
         (b"\r\nERROR\r\n", "modem", "a modem replies"),
         (&[0xf8, 0x80, 0xe6, 0x98], "wrong_firmware", "nor frames"),
     ] {
-        let (code, report) = stranger(says);
+        let (code, report) = stranger(has_text);
         assert_eq!(findings(&report), [format!("board {cause} failed")], "{report:#}");
         assert!(detail(&report, "board").contains(name), "{report:#}");
         assert_eq!(code, Some(3));

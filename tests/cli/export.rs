@@ -18,10 +18,10 @@ fn simulated(folder: &Path, name: &str, pose: &str) -> String {
     log
 }
 
-fn said(output: &Output) -> String {
-    let said = stderr(output);
-    assert!(!said.contains("panicked"), "{said}");
-    said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
+fn printed(output: &Output) -> String {
+    let printed = stderr(output);
+    assert!(!printed.contains("panicked"), "{printed}");
+    printed.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
 }
 
 fn table_of(arguments: &[&str]) -> Vec<csv::StringRecord> {
@@ -54,10 +54,10 @@ fn one_row_per_reading() {
     let text = String::from_utf8(from_stdin.stdout).expect("text");
     assert_eq!(text.lines().count(), 401, "{}", String::from_utf8_lossy(&from_stdin.stderr));
     let ranges = Log::read(Path::new(&first));
-    let heard = ranges.pings().iter().filter(|ping| !ping["range_m"].is_null()).count();
+    let received = ranges.pings().iter().filter(|ping| !ping["range_m"].is_null()).count();
     let at = text.lines().next().expect("names").split(',').position(|name| name == "range_m");
     let at = at.expect("a column");
-    assert_eq!(rows[..400].iter().filter(|row| !row[at].is_empty()).count(), heard);
+    assert_eq!(rows[..400].iter().filter(|row| !row[at].is_empty()).count(), received);
 }
 
 #[test]
@@ -70,9 +70,9 @@ fn format_selection() {
         let refused = run(arguments);
         assert_eq!(refused.status.code(), Some(2), "{arguments:?}");
         assert!(
-            said(&refused).contains("--to mcap, --to parquet or --to csv"),
+            printed(&refused).contains("--to mcap, --to parquet or --to csv"),
             "{}",
-            said(&refused)
+            printed(&refused)
         );
     }
     assert!(!folder.path().join("a.txt").exists());
@@ -81,7 +81,7 @@ fn format_selection() {
     assert!(run(&["export", &log, "-o", &path("a.csv")]).status.success());
     fs::write(path("b.csv"), "azimuth_deg,range_m\n0,1\n").expect("writable");
     let refused = run(&["export", &log, "-o", &path("b.csv")]);
-    assert!(said(&refused).contains("comma-separated"), "{}", said(&refused));
+    assert!(printed(&refused).contains("comma-separated"), "{}", printed(&refused));
     assert_eq!(refused.status.code(), Some(2));
     for _ in 0..2 {
         assert!(run(&["export", &log, "-o", &path("a.parquet")]).status.success());
@@ -90,7 +90,7 @@ fn format_selection() {
     assert_eq!(fs::read(path("a.parquet")).expect("written"), to_pipe.stdout);
     fs::write(path("b.parquet"), b"PAR1\x15\x04\x15").expect("writable");
     let refused = run(&["export", &log, "-o", &path("b.parquet")]);
-    assert!(said(&refused).contains("a table in Parquet"), "{}", said(&refused));
+    assert!(printed(&refused).contains("a table in Parquet"), "{}", printed(&refused));
     assert_eq!(refused.status.code(), Some(2));
 }
 
@@ -114,7 +114,7 @@ fn recording_with_attached_log() {
     }
     assert!(record("a.mcap", &["--without-log"]).status.success());
     assert!(fs::metadata(path("a.mcap")).expect("written").len() < 20_000);
-    // Somebody's recording, of another program.
+    // A recording of another program.
     fs::write(path("b.mcap"), b"\x89MCAP0\r\n\x01robot").expect("writable");
     assert_eq!(record("b.mcap", &[]).status.code(), Some(2));
     for (out, wrong) in [
@@ -126,7 +126,7 @@ fn recording_with_attached_log() {
         ("c.parquet", &["--frame", "front"]),
     ] {
         let refused = record(out, wrong);
-        assert_eq!(refused.status.code(), Some(2), "{wrong:?}: {}", said(&refused));
+        assert_eq!(refused.status.code(), Some(2), "{wrong:?}: {}", printed(&refused));
         assert!(!Path::new(&path(out)).exists());
     }
 }
@@ -138,12 +138,12 @@ fn empty_folders_and_logs() {
     let out = out.to_str().expect("a plain path");
     let refused = run(&["export", empty, "-o", out]);
     assert_eq!(refused.status.code(), Some(2));
-    assert!(said(&refused).contains("no log in the folder"), "{}", said(&refused));
+    assert!(printed(&refused).contains("no log in the folder"), "{}", printed(&refused));
     let log = folder.path().join("session.jsonl");
     fs::write(&log, SMALL.lines().next().expect("a session")).expect("writable");
     let refused = run(&["export", log.to_str().expect("a plain path"), "-o", out]);
     assert_eq!(refused.status.code(), Some(2));
-    assert!(said(&refused).contains("there are no scans to export"), "{}", said(&refused));
+    assert!(printed(&refused).contains("there are no scans to export"), "{}", printed(&refused));
     assert!(!Path::new(out).exists());
 }
 

@@ -1,4 +1,4 @@
-//! What a scan does when the line or the device misbehaves.
+//! Scans under faults of line and device.
 
 use std::{process::Stdio, time::Duration};
 
@@ -94,9 +94,9 @@ fn interrupt_closes_the_log() {
     assert!(out.join("scan.png").exists(), "what was measured is drawn");
     let verified = run(&["log", "verify", log_path.to_str().expect("plain path")]);
     assert!(!stderr(&verified).contains("torn"));
-    let (_, said) = mock.stop();
+    let (_, printed) = mock.stop();
     // The device stopped on request: it neither went on nor waited for its lease to end.
-    assert!(!said.contains("400 firings") && !said.contains("coils released"), "{said}");
+    assert!(!printed.contains("400 firings") && !printed.contains("coils released"), "{printed}");
 }
 
 #[test]
@@ -131,8 +131,8 @@ fn killed_host_expires_the_lease() {
         "9",
     ]);
     assert_eq!(again.status.code(), Some(0), "{}", stderr(&again));
-    let (_, said) = mock.stop();
-    assert!(said.contains("coils released"), "{said}");
+    let (_, printed) = mock.stop();
+    assert!(printed.contains("coils released"), "{printed}");
 }
 
 #[test]
@@ -163,8 +163,8 @@ fn left_over_sweep_is_stopped() {
         let next = run(arguments);
         assert_eq!(next.status.code(), Some(0), "{name} {number}: {}", stderr(&next));
     }
-    let (_, said) = mock.stop();
-    assert!(!said.contains("coils released"), "no lease had to end: {said}");
+    let (_, printed) = mock.stop();
+    assert!(!printed.contains("coils released"), "no lease had to end: {printed}");
 }
 
 #[test]
@@ -216,8 +216,8 @@ fn impossible_readings() {
     assert_eq!(lost.len(), 4, "beams 7, 107, 207 and 307");
     assert!(lost.iter().all(|ping| ping["index"].as_u64().is_some_and(|index| index % 100 == 7)));
     assert_eq!((&log.end()["missing"], &log.end()["beams"]), (&4.into(), &396.into()));
-    let told = log.events().iter().filter(|event| event.contains("echo after")).count();
-    assert_eq!(told, 4, "{:?}", log.events());
+    let reported = log.events().iter().filter(|event| event.contains("echo after")).count();
+    assert_eq!(reported, 4, "{:?}", log.events());
 }
 
 #[test]
@@ -226,10 +226,10 @@ fn other_board_ends_the_session() {
     let further = ["--faults", "reset=0.02,lie=other-steps", "--seed", "2"];
     let output = mock_scan("fig9", folder.path(), &further);
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
-    // As it stands without the lines that a terminal breaks it into.
-    let said = stderr(&output).replace('│', " ");
-    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(said.contains("800 steps per revolution, not 400"), "{said}");
+    // Joined, without the line breaks of a terminal.
+    let printed = stderr(&output).replace('│', " ");
+    let printed = printed.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(printed.contains("800 steps per revolution, not 400"), "{printed}");
     let log = Log::read(&folder.path().join("scan.jsonl"));
     log.assert_each_beam_once(400);
     assert!(log.end()["missing"].as_u64() > Some(0));

@@ -3,13 +3,13 @@
 use std::{fs, process::Stdio};
 
 use crate::{
-    collect::said,
+    collect::printed,
     common::{run, sonard, stderr},
 };
 
 const LOG: &str = include_str!("../fixtures/small.jsonl");
 
-/// Files that are no logs, by name, content, and what the message must say.
+/// Files that are no logs: name, content, and the expected part of the message.
 fn others() -> Vec<(&'static str, Vec<u8>, &'static str)> {
     let mut junk = Vec::new();
     let mut state = 7_u32;
@@ -42,7 +42,7 @@ fn other_kinds_of_file() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).display().to_string();
     let (svg, map) = (path("out.svg"), path("map"));
-    for (name, content, says) in others() {
+    for (name, content, has_text) in others() {
         fs::write(path(name), &content).expect("writable");
         let file = path(name);
         for arguments in [
@@ -56,7 +56,7 @@ fn other_kinds_of_file() {
             let output = run(&arguments);
             let message = stderr(&output);
             assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
-            assert!(said(&output).contains(says), "{arguments:?}: {message}");
+            assert!(joined_stderr(&output).contains(has_text), "{arguments:?}: {message}");
             assert!(message.lines().count() <= 16, "{arguments:?}: {message}");
         }
         // These look at any text, but not without end.
@@ -73,10 +73,10 @@ fn other_kinds_of_file() {
         let piped = sonard(&["compare", "-"]).stdin(fs::File::open(&file).expect("there")).output();
         let output = piped.expect("starts");
         assert_eq!(output.status.code(), Some(2), "{name}: {}", stderr(&output));
-        assert!(said(&output).contains(says), "{name}: {}", stderr(&output));
+        assert!(joined_stderr(&output).contains(has_text), "{name}: {}", stderr(&output));
     }
     let output = run(&["plot", folder.path().to_str().expect("plain path")]);
-    assert!(said(&output).contains("directory"), "{}", stderr(&output));
+    assert!(joined_stderr(&output).contains("directory"), "{}", stderr(&output));
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn unreadable_log() {
         [&["compare", &log][..], &["log", "show", &log], &["plot", &log, "-o", "x.svg"]]
     {
         let output = sonard(arguments).stdout(Stdio::null()).output().expect("starts");
-        let message = said(&output);
+        let message = joined_stderr(&output);
         assert_eq!(output.status.code(), Some(2), "{message}");
         assert!(message.contains("cannot open") && !message.contains("write"), "{message}");
     }

@@ -1,4 +1,4 @@
-//! Data sets, through the whole program: parts, kills, damage, and what an array job's environment says.
+//! Data sets, through the whole program: parts, kills, damage, and the environment of array jobs.
 
 use std::{
     collections::BTreeMap,
@@ -91,10 +91,10 @@ fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     all
 }
 
-fn said(output: &Output) -> String {
-    let said = stderr(output);
-    assert!(!said.contains("panicked"), "{said}");
-    said.replace('\u{2502}', " ").split_whitespace().collect::<Vec<_>>().join(" ")
+fn printed(output: &Output) -> String {
+    let printed = stderr(output);
+    assert!(!printed.contains("panicked"), "{printed}");
+    printed.replace('\u{2502}', " ").split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 #[test]
@@ -102,9 +102,9 @@ fn identical_for_any_parallelism() {
     let case = Case::new();
     let one = case.command("one", &[]).env("RAYON_NUM_THREADS", "1").output().expect("it starts");
     assert!(
-        one.status.success() && said(&one).contains("complete: 6 shards, 21600 readings"),
+        one.status.success() && printed(&one).contains("complete: 6 shards, 21600 readings"),
         "{}",
-        said(&one)
+        printed(&one)
     );
     let wanted = files(&case.path("one"));
     assert!(
@@ -123,15 +123,15 @@ fn identical_for_any_parallelism() {
     });
     for child in running {
         let output = child.wait_with_output().expect("it ends");
-        assert!(output.status.success(), "{}", said(&output));
+        assert!(output.status.success(), "{}", printed(&output));
     }
-    // Whoever was last may have seen a part that was not there yet.
+    // The last process may have counted a part that was not complete yet.
     let last = case.generate("parts", &[]);
-    assert!(said(&last).contains("0 shards made, 6 already complete"), "{}", said(&last));
+    assert!(printed(&last).contains("0 shards made, 6 already complete"), "{}", printed(&last));
     assert_eq!(files(&case.path("parts")), wanted);
     let verified = case.verify("parts", &["--recheck", "2"]);
-    let told = String::from_utf8_lossy(&verified.stdout).into_owned();
-    assert!(verified.status.success() && told.contains("verified, 2 recomputed"), "{told}");
+    let reported = String::from_utf8_lossy(&verified.stdout).into_owned();
+    assert!(verified.status.success() && reported.contains("verified, 2 recomputed"), "{reported}");
     // From the specification that the set itself holds, in another folder.
     let (spec, out) = (case.text_path("one/spec.json"), case.text_path("again"));
     assert!(run(&["generate", &spec, "--out", &out, "--shard", "1/1"]).status.success());
@@ -167,7 +167,7 @@ fn resumes_after_kill() {
     }
     assert!(killed_midway > 0, "none was killed before its end");
     let done = case.generate("killed", &[]);
-    assert!(done.status.success(), "{}", said(&done));
+    assert!(done.status.success(), "{}", printed(&done));
     assert_eq!(files(&case.path("killed")), wanted);
     let hidden = fs::read_dir(case.path("killed")).expect("a folder").filter(|entry| {
         entry.as_ref().is_ok_and(|entry| entry.file_name().to_string_lossy().starts_with(".shard"))
@@ -190,16 +190,20 @@ fn array_jobs() {
         ("SLURM_ARRAY_TASK_STEP", "1"),
     ];
     let second = in_array(&slurm, &[]);
-    assert!(said(&second).starts_with("part 2/3, from SLURM_ARRAY_TASK_ID"), "{}", said(&second));
-    assert!(said(&second).contains("4 of 6 shards missing"), "{}", said(&second));
+    assert!(
+        printed(&second).starts_with("part 2/3, from SLURM_ARRAY_TASK_ID"),
+        "{}",
+        printed(&second)
+    );
+    assert!(printed(&second).contains("4 of 6 shards missing"), "{}", printed(&second));
     let first = in_array(&[("JOB_COMPLETION_INDEX", "0")], &[]);
     assert!(
-        said(&first).contains("part 1/6") && said(&first).contains("1 shards made"),
+        printed(&first).contains("part 1/6") && printed(&first).contains("1 shards made"),
         "{}",
-        said(&first)
+        printed(&first)
     );
     let by_option = in_array(&slurm, &["--shard", "6/6"]);
-    assert!(said(&by_option).contains("from --shard; SLURM_ARRAY_TASK_ID is ignored"));
+    assert!(printed(&by_option).contains("from --shard; SLURM_ARRAY_TASK_ID is ignored"));
     let there: Vec<_> =
         (1..=6).filter(|n| case.path(&format!("array/shard-0000{n}")).exists()).collect();
     assert_eq!(there, [1, 2, 5, 6]);
@@ -209,33 +213,37 @@ fn array_jobs() {
         (&[], &["--shard", "3"], "as in 3/20"),
     ] {
         let output = in_array(variables, further);
-        assert_eq!(output.status.code(), Some(2), "{}", said(&output));
-        assert!(said(&output).contains(part), "{}", said(&output));
+        assert_eq!(output.status.code(), Some(2), "{}", printed(&output));
+        assert!(printed(&output).contains(part), "{}", printed(&output));
     }
 }
 
 #[test]
 fn wrong_specifications_and_damage() {
     let case = Case::new();
-    let told = case.generate("set", &["--check"]);
-    let size = String::from_utf8_lossy(&told.stdout).into_owned();
+    let reported = case.generate("set", &["--check"]);
+    let size = String::from_utf8_lossy(&reported.stdout).into_owned();
     assert!(
-        told.status.success() && size.contains("6 shards of 3 scenes with 3 poses each, 21600"),
+        reported.status.success() && size.contains("6 shards of 3 scenes with 3 poses each, 21600"),
         "{size}"
     );
     assert!(!case.path("set").exists());
     assert!(case.generate("set", &["--shard", "1/2"]).status.success());
     let missing = case.verify("set", &[]);
-    let told = String::from_utf8_lossy(&missing.stdout).into_owned();
-    assert_eq!((missing.status.code(), told.matches("is missing").count()), (Some(1), 3), "{told}");
+    let reported = String::from_utf8_lossy(&missing.stdout).into_owned();
+    assert_eq!(
+        (missing.status.code(), reported.matches("is missing").count()),
+        (Some(1), 3),
+        "{reported}"
+    );
     // A foreign set's folder, a wrong key, no file, no room.
     fs::write(case.path("spec.toml"), SPEC.replace("poses = 3", "poses = 4")).expect("writable");
     let foreign = case.generate("set", &[]);
     assert_eq!(foreign.status.code(), Some(2));
     assert!(
-        said(&foreign).contains("contains the data set of another specification"),
+        printed(&foreign).contains("contains the data set of another specification"),
         "{}",
-        said(&foreign)
+        printed(&foreign)
     );
     for (from, to, part) in [
         ("poses = 3", "pose = 3", "spec.toml:5:1: set.pose: unknown field `pose`"),
@@ -244,8 +252,8 @@ fn wrong_specifications_and_damage() {
     ] {
         fs::write(case.path("spec.toml"), SPEC.replace(from, to)).expect("writable");
         let output = case.generate("other", &[]);
-        assert_eq!(output.status.code(), Some(2), "{}", said(&output));
-        assert!(said(&output).contains(part), "{part}: {}", said(&output));
+        assert_eq!(output.status.code(), Some(2), "{}", printed(&output));
+        assert!(printed(&output).contains(part), "{part}: {}", printed(&output));
     }
     // Sensors and scenes beside the specification.
     let sensor = run(&["sensor", "show", "hc-sr04"]).stdout;
@@ -253,9 +261,9 @@ fn wrong_specifications_and_damage() {
     let with_sensor = SPEC.replace("[model]", "[sensor]\nany_of = [\"mine.json\"]\n[model]");
     fs::write(case.path("spec.toml"), with_sensor).expect("writable");
     let output = case.generate("mine", &["--shard", "1/6"]);
-    assert!(output.status.success(), "{}", said(&output));
+    assert!(output.status.success(), "{}", printed(&output));
     let empty = case.verify("nowhere", &[]);
-    assert_eq!(empty.status.code(), Some(2), "{}", said(&empty));
+    assert_eq!(empty.status.code(), Some(2), "{}", printed(&empty));
     let example = run(&["generate", "--example"]);
     fs::write(case.path("spec.toml"), &example.stdout).expect("writable");
     assert!(case.generate("example", &["--check"]).status.success());

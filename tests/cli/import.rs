@@ -17,13 +17,13 @@ fn done(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).expect("text")
 }
 
-/// Runs a verb that should refuse; what it says.
+/// Runs a verb that must reject its input; returns the message.
 fn refused(arguments: &[&str]) -> String {
     let output = run(arguments);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-    let said = stderr(&output);
-    assert!(!said.contains("panicked"), "{said}");
-    said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
+    let printed = stderr(&output);
+    assert!(!printed.contains("panicked"), "{printed}");
+    printed.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ")
 }
 
 /// The readings of the model at 15 degrees, in a table as people write them: clockwise from the right, in
@@ -89,8 +89,11 @@ fn table_to_log() {
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
         stderr(&output)
     };
-    let said = import(&log);
-    assert!(said.contains("`Angle [deg]` -> azimuth_deg, `Distance [cm]` -> range_cm"), "{said}");
+    let printed = import(&log);
+    assert!(
+        printed.contains("`Angle [deg]` -> azimuth_deg, `Distance [cm]` -> range_cm"),
+        "{printed}"
+    );
     let records = Log::read(log.as_ref());
     let session = &records.records[0];
     assert_eq!(session["provenance"], "imported");
@@ -107,13 +110,16 @@ fn table_to_log() {
     let agree = |arguments: &[&str]| {
         let mut all = vec!["compare", "--json"];
         all.extend(arguments);
-        let said: serde_json::Value = serde_json::from_str(&done(&all)).expect("an object");
-        (said["agree"].as_u64().expect("a count"), said["both_echo"].as_u64().expect("a count"))
+        let printed: serde_json::Value = serde_json::from_str(&done(&all)).expect("an object");
+        (
+            printed["agree"].as_u64().expect("a count"),
+            printed["both_echo"].as_u64().expect("a count"),
+        )
     };
     done(&["predict", &log, "--ideal-receiver", "-o", &predicted]);
     let (agreeing, both) = agree(&[&predicted]);
     assert!(both > 60 && agreeing == both, "{agreeing} of {both}");
-    // Another pose explains less, and says so; so does other air.
+    // Another pose explains less, with a message; so does other air.
     assert!(agree(&[&predicted, "--pose", "1.3,1,90"]).0 < both / 2);
     assert!(agree(&[&predicted, "--heading", "80"]).0 < both / 2);
     assert!(agree(&[&log, "--temperature-c", "-5"]).0 < agree(&[&log]).0);
@@ -208,8 +214,8 @@ fn minimal_log_of_the_manual() {
 }
 
 /// Status, azimuth and range of each reading, and by which ranger.
-fn heard(log: &str) -> Vec<(String, i64, Option<String>, Option<String>)> {
-    let told = |ping: &&serde_json::Value| {
+fn received(log: &str) -> Vec<(String, i64, Option<String>, Option<String>)> {
+    let reported = |ping: &&serde_json::Value| {
         let word = |name: &str| ping[name].as_str().map(str::to_owned);
         let azimuth = (ping["azimuth_deg"].as_f64().expect("a direction") * 1e3).round() as i64;
         let range_m = ping["range_m"].as_f64().map(|range_m| (range_m as f32).to_string());
@@ -217,10 +223,10 @@ fn heard(log: &str) -> Vec<(String, i64, Option<String>, Option<String>)> {
         let range_m = range_m.filter(|_| status == "echo");
         (status, azimuth % 360_000, range_m, word("ranger"))
     };
-    Log::parse(log).pings().iter().map(told).collect()
+    Log::parse(log).pings().iter().map(reported).collect()
 }
 
-/// Where the robot stood at each reading, to a micrometre.
+/// Returns the position of the robot at each reading, to a micrometre.
 fn places(log: &str) -> Vec<[i64; 3]> {
     let (mut of_scan, mut places) = (serde_json::Value::Null, Vec::new());
     for line in log.lines() {
@@ -239,7 +245,7 @@ fn places(log: &str) -> Vec<[i64; 3]> {
     places
 }
 
-/// What `sonard export` wrote comes back with the same readings in the same places.
+/// Recordings of `sonard export` are imported with equal readings and positions.
 #[test]
 fn recording_round_trip() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -257,7 +263,7 @@ fn recording_round_trip() {
             done(&["export", &log, "--profile", profile, "-o", &recording]);
             let again = done(&["import", &recording]);
             let was = fs::read_to_string(&log).expect("written");
-            assert_eq!(heard(&again), heard(&was), "{simulate:?} {profile}");
+            assert_eq!(received(&again), received(&was), "{simulate:?} {profile}");
             assert_eq!(places(&again), places(&was), "{simulate:?}");
         }
         // Of a scan that has the form of one, the laser's as well.
@@ -267,7 +273,7 @@ fn recording_round_trip() {
             assert_eq!(laser.status.code(), Some(2), "{}", stderr(&laser));
         } else {
             let text = String::from_utf8(laser.stdout).expect("text");
-            assert_eq!(heard(&text), heard(&fs::read_to_string(&log).expect("written")));
+            assert_eq!(received(&text), received(&fs::read_to_string(&log).expect("written")));
         }
     }
 }
@@ -298,7 +304,10 @@ fn database_without_the_feature() {
     let file = folder.path().join("bag_0.db3");
     fs::write(&file, b"SQLite format 3\0").expect("writable");
     for given in [bag, file.to_str().expect("a plain path")] {
-        let told = refused(&["import", given]);
-        assert!(told.contains("ros2 bag convert") && told.contains("--features sqlite"), "{told}");
+        let reported = refused(&["import", given]);
+        assert!(
+            reported.contains("ros2 bag convert") && reported.contains("--features sqlite"),
+            "{reported}"
+        );
     }
 }

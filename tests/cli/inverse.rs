@@ -99,25 +99,25 @@ fn symmetric_and_wrong_rooms() {
     assert!(elsewhere[0]["diagnoses"][0]["kind"].is_string(), "{}", elsewhere[0]);
 }
 
-/// A ranger less sensitive than the one that `locate` is told of, and one whose log says so.
+/// A ranger less sensitive than `locate` assumes, and one whose log states its sensitivity.
 #[test]
 fn threshold_with_pose() {
     const THRESHOLD: f64 = 0.3;
     let folder = tempfile::tempdir().expect("a folder");
     let usual = sonard::acoustics::Sensor::preset("hc-sr04").expect("a preset");
-    let deaf = sonard::acoustics::Sensor { threshold: THRESHOLD, ..usual };
-    let file = folder.path().join("deaf.json");
-    fs::write(&file, serde_json::to_string(&deaf).expect("JSON")).expect("a file");
+    let insensitive = sonard::acoustics::Sensor { threshold: THRESHOLD, ..usual };
+    let file = folder.path().join("insensitive.json");
+    fs::write(&file, serde_json::to_string(&insensitive).expect("JSON")).expect("a file");
     let (file, threshold) = (file.to_str().expect("a plain path"), THRESHOLD.to_string());
     let fit = ["locate", "--fit", "threshold", "--prior", "threshold_db=8", "--json"];
-    for (sensor, told) in [
+    for (sensor, reported) in [
         (vec!["--sensor", file], vec!["--sensor", "hc-sr04"]),
         (vec!["--sensor", "hc-sr04", "--threshold", &threshold], vec![]),
     ] {
         let steps = ["--step-deg", "4", "--max-range", "4"];
         let log =
             sweep(folder.path(), "two-surface-room", "1.0,1.3,25", &[&sensor[..], &steps].concat());
-        let found = lines(&[&fit[..], &[log.as_str()], &told[..]].concat());
+        let found = lines(&[&fit[..], &[log.as_str()], &reported[..]].concat());
         let off_m = (number(&found[0], "x_m") - 1.0).hypot(number(&found[0], "y_m") - 1.3);
         assert!(off_m < 0.02, "{sensor:?}: {}", found[0]);
         let besides = &found[0]["nuisance"][0];
@@ -173,7 +173,7 @@ fn course_from_a_growing_log() {
     assert_eq!(of_end.count(), 2, "{alone:?}");
 }
 
-/// Two chair legs and a bin stand in a room of which the scene knows the walls alone.
+/// Two chair legs and a bin are in a room whose scene has the walls only.
 #[test]
 fn furniture_does_not_bias() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -222,8 +222,11 @@ fn unfittable_parameters() {
     ] {
         let output = run(&arguments);
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
-        let said = stderr(&output);
-        assert!(said.contains(part) && !said.contains("panicked"), "{arguments:?}: {said}");
+        let printed = stderr(&output);
+        assert!(
+            printed.contains(part) && !printed.contains("panicked"),
+            "{arguments:?}: {printed}"
+        );
     }
 }
 
@@ -239,15 +242,15 @@ fn height_and_correlations() {
     let fit = ["calibrate", &log, "--fit", "pose,heading,height"];
     let found = lines(&[&fit[..], &["--json"]].concat());
     let height = found.iter().find(|line| line["name"] == "height_m").expect("a height");
-    // Half a metre above the floor, if nothing else is said.
+    // Half a metre above the floor by default.
     assert_eq!(number(height, "prior"), 0.5);
     assert!((number(height, "value") - 0.5).abs() < 2.0 * number(height, "sigma"), "{height}");
     let output = run(&fit);
-    let said = String::from_utf8(output.stdout).expect("text");
+    let printed = String::from_utf8(output.stdout).expect("text");
     // A turn of the robot and one of the stepper's zero are the same, whatever is read.
     let is_told = |line: &str| {
         line.starts_with("strongly correlated: heading_deg of ")
             && line.contains(" and heading_zero_deg (-1")
     };
-    assert!(said.lines().any(is_told), "{said}");
+    assert!(printed.lines().any(is_told), "{printed}");
 }

@@ -12,10 +12,10 @@ const LOG: &str = include_str!("../fixtures/small.jsonl");
 #[track_caller]
 fn check(arguments: &[&str], code: i32) -> String {
     let output = run(arguments);
-    let said = String::from_utf8_lossy(&output.stdout).into_owned() + &stderr(&output);
-    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {said}");
-    assert!(!said.contains("panicked"), "{said}");
-    said
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned() + &stderr(&output);
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {printed}");
+    assert!(!printed.contains("panicked"), "{printed}");
+    printed
 }
 
 fn log_of(folder: &Path, bytes: impl AsRef<[u8]>) -> String {
@@ -29,17 +29,17 @@ fn repair_of_an_incomplete_line() {
     let folder = tempfile::tempdir().expect("a folder");
     let torn = &LOG[..LOG.len() - 200];
     let log = &log_of(folder.path(), torn);
-    let said = check(&["log", "verify", log], 1);
-    assert!(said.contains(":10: problem: the last line is torn"), "{said}");
-    assert!(said.contains("sonard log repair"), "{said}");
-    let said = check(&["log", "repair", log], 0);
-    assert!(said.contains("9 records kept") && said.contains(".orig"), "{said}");
+    let printed = check(&["log", "verify", log], 1);
+    assert!(printed.contains(":10: problem: the last line is torn"), "{printed}");
+    assert!(printed.contains("sonard log repair"), "{printed}");
+    let printed = check(&["log", "repair", log], 0);
+    assert!(printed.contains("9 records kept") && printed.contains(".orig"), "{printed}");
     let whole = torn.rfind('\n').expect("many lines") + 1;
     assert_eq!(fs::read_to_string(log).expect("it is there"), torn[..whole]);
     let original = fs::read_to_string(format!("{log}.orig")).expect("it is kept");
     assert_eq!(original, torn);
-    let said = check(&["log", "verify", log], 0);
-    assert!(said.contains("warning: scan") && said.contains("no scan_end"), "{said}");
+    let printed = check(&["log", "verify", log], 0);
+    assert!(printed.contains("warning: scan") && printed.contains("no scan_end"), "{printed}");
     check(&["log", "verify", "--strict", log], 1);
     assert!(check(&["log", "repair", log], 0).contains("nothing to repair"));
 }
@@ -48,11 +48,11 @@ fn repair_of_an_incomplete_line() {
 fn damaged_lines() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = &log_of(folder.path(), LOG.replacen("\"ping\"", "\"ping", 1));
-    let said = check(&["log", "verify", log], 1);
-    assert!(said.contains("scan.jsonl:3: problem: column "), "{said}");
-    let said = check(&["log", "repair", log], 1);
+    let printed = check(&["log", "verify", log], 1);
+    assert!(printed.contains("scan.jsonl:3: problem: column "), "{printed}");
+    let printed = check(&["log", "repair", log], 1);
     let length = LOG.lines().nth(2).expect("a reading").len() - 1;
-    assert!(said.contains(&format!("scan.jsonl:3: removed {length} byte")), "{said}");
+    assert!(printed.contains(&format!("scan.jsonl:3: removed {length} byte")), "{printed}");
     let json = check(&["log", "verify", "--json", log], 1);
     let lines: Vec<Value> =
         json.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
@@ -66,8 +66,8 @@ fn unreadable_files() {
     let empty = folder.path().to_str().expect("plain path");
     for verb in [&["log", "verify"][..], &["log", "repair"], &["log", "show"], &["compare"]] {
         for path in ["/no/such/log.jsonl", empty] {
-            let said = check(&[verb, &[path]].concat(), 2);
-            assert!(said.contains(path) && said.contains("help:"), "{said}");
+            let printed = check(&[verb, &[path]].concat(), 2);
+            assert!(printed.contains(path) && printed.contains("help:"), "{printed}");
         }
     }
     check(&["log", "repair", "-"], 2);
@@ -77,7 +77,7 @@ fn unreadable_files() {
 fn show() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = &log_of(folder.path(), format!("{LOG}rubbish\n"));
-    let said = check(&["log", "show", "--readings", log], 0);
+    let printed = check(&["log", "show", "--readings", log], 0);
     for part in [
         "senscomp-6500",
         "simple-room",
@@ -89,7 +89,7 @@ fn show() {
         "stopped: on request",
         "line 12",
     ] {
-        assert!(said.contains(part), "{part} is not in:\n{said}");
+        assert!(printed.contains(part), "{part} is not in:\n{printed}");
     }
     let json = check(&["log", "show", "--json", log], 0);
     let types: Vec<Value> = json
@@ -99,31 +99,34 @@ fn show() {
     assert_eq!(types, ["session", "scan", "event", "damaged"]);
     let mut follow = sonard(&["log", "show", "--follow", "-"]);
     let output = follow.stdin(fs::File::open(log).expect("it is there")).output().expect("runs");
-    let said = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(said.contains("ends after 0.4 s: 7 beams") && said.contains("line 12"), "{said}");
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(
+        printed.contains("ends after 0.4 s: 7 beams") && printed.contains("line 12"),
+        "{printed}"
+    );
 }
 
 #[test]
 fn compare_json() {
     let folder = tempfile::tempdir().expect("a folder");
     let log = &log_of(folder.path(), LOG);
-    let said = check(&["compare", "--json", log], 0);
-    let json: Value = serde_json::from_str(&said).expect("one object");
+    let printed = check(&["compare", "--json", log], 0);
+    let json: Value = serde_json::from_str(&printed).expect("one object");
     for (field, expected) in [("beams", 6), ("both_echo", 4), ("agree", 3), ("measured_only", 0)] {
         assert_eq!(json[field], expected, "{field}");
     }
     assert_eq!(json["verdicts"]["multiple"], 1);
     // Of several logs, one more for all of them.
-    let said = check(&["compare", "--json", log, log], 0);
+    let printed = check(&["compare", "--json", log, log], 0);
     let lines: Vec<Value> =
-        said.lines().map(|line| serde_json::from_str(line).expect("an object")).collect();
+        printed.lines().map(|line| serde_json::from_str(line).expect("an object")).collect();
     assert_eq!((lines.len(), &lines[0], &lines[1]), (3, &json, &json));
     assert_eq!((&lines[2]["logs"], &lines[2]["beams"]), (&2.into(), &12.into()));
-    let said = check(&["compare", log], 0);
-    assert!(said.contains("Largest residuals") && said.contains("300.0 mm"), "{said}");
+    let printed = check(&["compare", log], 0);
+    assert!(printed.contains("Largest residuals") && printed.contains("300.0 mm"), "{printed}");
     // In another scene the predictions are others, and it still runs.
-    let said = check(&["compare", "--json", "--scene", "simple-room", log], 0);
-    let again: Value = serde_json::from_str(&said).expect("one object and no complaint");
+    let printed = check(&["compare", "--json", "--scene", "simple-room", log], 0);
+    let again: Value = serde_json::from_str(&printed).expect("one object and no complaint");
     assert_eq!(again["beams"], 6);
     assert_ne!(again["median_abs_residual_m"], json["median_abs_residual_m"]);
 }
@@ -136,10 +139,10 @@ fn simulated_scan_agrees() {
     let pose = ["--scene", "simple-room", "--pose", "fig9"];
     check(&[&["simulate"][..], &pose, &["--step-deg", "9", "-o", log]].concat(), 0);
     check(&["log", "verify", "--strict", log], 0);
-    let said = check(&["compare", log], 0);
-    assert!(said.contains("--scene adds them"), "{said}");
-    let said = check(&["compare", "--json", "--scene", "simple-room", log], 0);
-    let json: Value = serde_json::from_str(&said).expect("one object");
+    let printed = check(&["compare", log], 0);
+    assert!(printed.contains("--scene adds them"), "{printed}");
+    let printed = check(&["compare", "--json", "--scene", "simple-room", log], 0);
+    let json: Value = serde_json::from_str(&printed).expect("one object");
     assert_eq!(json["beams"], 40);
     assert_eq!(json["agree"], json["both_echo"]);
     assert_eq!(json["verdicts"]["unexplained"], 0);
@@ -156,8 +159,8 @@ fn empty_and_partial_logs() {
         (&session_only, 0, "contains no readings"),
     ] {
         let log = &log_of(folder.path(), bytes);
-        let said = check(&["compare", log], code);
-        assert!(said.contains(part), "{said}");
+        let printed = check(&["compare", log], code);
+        assert!(printed.contains(part), "{printed}");
     }
     let one: String = LOG.lines().take(3).map(|line| format!("{line}\n")).collect();
     let log = &log_of(folder.path(), one);
@@ -179,10 +182,10 @@ fn predictions_of_a_moving_robot() {
     let [from, to] = ["fig9", "fig7"].map(simulated);
     let scan_of = |text: &str| Log::parse(text).end()["scan"].to_string();
     let to = to.replace(&scan_of(&to), &scan_of(&from));
-    let moved = from.lines().zip(to.lines()).map(|(stood, moved)| {
+    let moved = from.lines().zip(to.lines()).map(|(at_rest, moved)| {
         let mut ping: Value = serde_json::from_str(moved).expect("a record");
         if ping["index"].as_u64() < Some(20) {
-            return stood.to_owned();
+            return at_rest.to_owned();
         }
         ping["pose"] = serde_json::json!({"x_m": 0.834, "y_m": 0.345, "heading_deg": 0.0});
         ping.to_string()
@@ -218,13 +221,16 @@ fn unsupported_formats() {
             vec!["log", "show", log],
         ] {
             // Lines of the message are wrapped.
-            let said = check(&arguments, 2).replace('\u{2502}', " ");
-            let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
-            assert!(said.contains(&format!("log format {format} is not supported")), "{said}");
-            assert!(said.contains("read the log with the version that wrote it"), "{said}");
+            let printed = check(&arguments, 2).replace('\u{2502}', " ");
+            let printed = printed.split_whitespace().collect::<Vec<_>>().join(" ");
+            assert!(
+                printed.contains(&format!("log format {format} is not supported")),
+                "{printed}"
+            );
+            assert!(printed.contains("read the log with the version that wrote it"), "{printed}");
         }
-        let said = check(&["log", "verify", log], 1);
-        assert!(said.contains(&format!("problem: format: log format {format} ")), "{said}");
+        let printed = check(&["log", "verify", log], 1);
+        assert!(printed.contains(&format!("problem: format: log format {format} ")), "{printed}");
         check(&["log", "repair", log], 0);
         assert_eq!(fs::read_to_string(log).expect("readable"), text);
     }

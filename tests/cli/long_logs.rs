@@ -13,7 +13,7 @@ use crate::common::{run, sonard, stderr};
 /// Scans of 400 beams in the log.
 const SCANS: usize = 700;
 
-/// One simulated scan with its predictions' paths, again and again under other ids.
+/// A simulated scan with its predicted paths, repeated under other ids.
 fn write_log(path: &Path, folder: &Path) {
     let one = folder.join("one.jsonl");
     let one = one.to_str().expect("a plain path");

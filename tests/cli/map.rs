@@ -132,7 +132,7 @@ fn map_of_one_scan() {
     let (one, three) = (of(&logs[..1]), of(&logs));
     assert_eq!((one["evidence"].as_u64(), three["evidence"].as_u64()), (Some(5), Some(2)));
     let free_m2 = |map: &Value| map["free_cells"].as_f64().expect("a number") * 0.05 * 0.05;
-    // The room has 10.8 square metres; one scan hears a good part of it.
+    // The room has 10.8 square metres; one scan covers a good part of it.
     assert!(free_m2(&one) > 2.0, "{one}");
 }
 
@@ -198,8 +198,11 @@ fn wrong_laser_scans() {
         fs::write(&file, format!("{{{pose},\"returns\":[]}}\n{line}\n")).expect("written");
         let output = run(&["lines", "--laser", path]);
         assert_eq!(output.status.code(), Some(2), "{line}");
-        let said = stderr(&output).replace('\n', " ");
-        assert!(said.contains(words) && said.contains("give one JSON object"), "{words}: {said}");
+        let printed = stderr(&output).replace('\n', " ");
+        assert!(
+            printed.contains(words) && printed.contains("give one JSON object"),
+            "{words}: {printed}"
+        );
     }
 }
 
@@ -260,7 +263,7 @@ fn update_of_a_map() {
     for kept in ["width", "height", "origin_m", "resolution_m"] {
         assert_eq!(of_one[kept], went_on[kept], "{kept}");
     }
-    assert_eq!(went_on["evidence"].as_u64(), Some(1), "what a map says is not said again");
+    assert_eq!(went_on["evidence"].as_u64(), Some(1), "evidence of a map is not counted again");
     let unknown = |map: &Value| map["unknown_cells"].as_u64().expect("a count");
     assert!(unknown(&went_on) < unknown(&of_one), "{of_one} {went_on}");
 

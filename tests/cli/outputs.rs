@@ -1,4 +1,4 @@
-//! What verbs write: never over what they read, over nothing that is not their own unasked, and whole
+//! Outputs of verbs: they never replace an input, nor foreign files without --force, and are complete
 //! or not at all.
 
 mod added;
@@ -16,7 +16,7 @@ use std::{
 use tempfile::TempDir;
 
 use crate::{
-    collect::said,
+    collect::printed,
     common::{Log, mock_scan, run, sonard, stderr},
 };
 
@@ -24,7 +24,7 @@ const LOG: &str = include_str!("../fixtures/small.jsonl");
 const SCENE: &str = include_str!("../../scenes/simple-room.json");
 
 /// A command whose output is its own input: the option of the output, the input by its name and
-/// content, and the arguments, in which `IN` stands for the input, `DIR` for its folder.
+/// content, and the arguments, in which `IN` is replaced by the input, `DIR` by its folder.
 struct Case {
     output: &'static str,
     input: (&'static str, &'static str),
@@ -160,9 +160,9 @@ fn run_case(arguments: &str, input: &Path, folder: &Path) -> Output {
 #[test]
 fn every_output_is_tested() {
     let known: BTreeSet<String> = sonard::cli::outputs().into_iter().collect();
-    let told: BTreeSet<String> = CASES.iter().map(|case| case.output.to_owned()).collect();
+    let reported: BTreeSet<String> = CASES.iter().map(|case| case.output.to_owned()).collect();
     let without: BTreeSet<String> = WITHOUT_INPUT.map(str::to_owned).into();
-    let mut expected = &told | &without;
+    let mut expected = &reported | &without;
     // A socket is configuration, and no path of the command line alone.
     assert!(expected.remove("run --socket"));
     assert_eq!(known, expected, "a verb that writes needs a case here");
@@ -195,8 +195,11 @@ fn links_to_inputs() {
         plot.stdin(fs::File::open(&input).expect("there")).output().expect("starts")
     };
     for name in ["hard.svg", "soft.svg", "softer.svg"] {
-        let message =
-            said(&run_case(&format!("scene draw IN --force -o DIR/{name}"), &input, folder.path()));
+        let message = joined_stderr(&run_case(
+            &format!("scene draw IN --force -o DIR/{name}"),
+            &input,
+            folder.path(),
+        ));
         assert!(message.contains("is read by this command"), "{name}: {message}");
         let output = at_stdin(name);
         assert_eq!(output.status.code(), Some(2), "{name}: {}", stderr(&output));
@@ -207,7 +210,7 @@ fn links_to_inputs() {
     let path = input.to_str().expect("plain path");
     let draw = sonard(&["scene", "draw", path]).stdout(out).stderr(Stdio::piped()).output();
     let output = draw.expect("starts");
-    assert!(said(&output).contains("standard output goes to"), "{}", stderr(&output));
+    assert!(joined_stderr(&output).contains("standard output goes to"), "{}", stderr(&output));
     assert_eq!(fs::read_to_string(&input).expect("kept"), SCENE);
 }
 
@@ -236,7 +239,7 @@ fn pictures_replace_pictures_only() {
     ] {
         fs::write(place(name), content).expect("writable");
         let refused = draw(name, "");
-        let message = said(&refused);
+        let message = joined_stderr(&refused);
         assert_eq!(refused.status.code(), Some(2), "{name}: {message}");
         assert!(message.contains(kind) && message.contains("--force"), "{name}: {message}");
         assert_eq!(fs::read_to_string(place(name)).expect("kept"), content);
@@ -256,7 +259,7 @@ fn logs_need_force() {
     let to_log = "simulate --scene simple-room --pose fig9 --to-deg 9 -o IN";
     let refused = run_case(to_log, &log, folder.path());
     assert_eq!(refused.status.code(), Some(2), "{}", stderr(&refused));
-    assert!(said(&refused).contains("is a log"), "{}", stderr(&refused));
+    assert!(joined_stderr(&refused).contains("is a log"), "{}", stderr(&refused));
     assert_eq!(fs::read_to_string(&log).expect("kept"), LOG);
     let new = to_log.replace("IN", "DIR/new.jsonl");
     assert!(run_case(&new, &log, folder.path()).status.success());

@@ -31,7 +31,7 @@ fn port_without_permission() {
     let path = pty.path().to_str().expect("plain path");
     let mut scan = sonard(&["scan", "--port", path, "--scene", "simple-room", "--pose", "fig9"]);
     if rustix::process::geteuid().is_root() {
-        // Root may open anything: try as somebody who may not, from where that one may be.
+        // Root may open any file: run as an unprivileged user, in a folder that this user may enter.
         let copy = tempfile::tempdir_in("/tmp").expect("a folder");
         fs::set_permissions(copy.path(), fs::Permissions::from_mode(0o755)).expect("ours");
         let program = copy.path().join("sonard");
@@ -79,7 +79,7 @@ fn no_reply_and_foreign_device() {
     let path = gps.path().to_str().expect("plain path").to_owned();
     let talking = std::thread::spawn(move || {
         for _ in 0..200 {
-            // A full pty only means that nobody listens yet.
+            // A full pty only means that there is no reader yet.
             let _ = gps.write(b"$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M\r\n");
             std::thread::sleep(Duration::from_millis(100));
         }

@@ -3,7 +3,7 @@
 use std::fs;
 
 use crate::{
-    collect::said,
+    collect::printed,
     common::{run, stderr},
 };
 
@@ -32,6 +32,6 @@ fn list_and_show() {
         assert_eq!(used.status.code(), Some(0), "{kind}: {}", stderr(&used));
         let unknown = run(&[kind, "show", "no-such-one"]);
         assert_eq!(unknown.status.code(), Some(2));
-        assert!(said(&unknown).contains(name), "{}", said(&unknown));
+        assert!(joined_stderr(&unknown).contains(name), "{}", joined_stderr(&unknown));
     }
 }

@@ -1,7 +1,7 @@
 //! Commands of the documents, run as pasted in an empty folder.
 //!
 //! Blocks marked `sh` in README.md and in the pages of the book (docs/) are run, less the lines of [`EXCEPTIONS`]. Blocks
-//! marked `sh,ignore` are not; the line before them says why, as `<!-- not run: REASON -->`.
+//! marked `sh,ignore` are not; the line before them states the reason, as `<!-- not run: REASON -->`.
 
 use std::{
     collections::BTreeSet,

@@ -1,4 +1,4 @@
-//! One scan, end to end: real bytes over a real pty, a log, a comparison, a picture.
+//! A scan from end to end: bytes over a pty, a log, a comparison, a picture.
 
 use std::fs;
 
@@ -59,9 +59,9 @@ fn mock_provenance() {
     assert_eq!(session["provenance"], "mock");
     assert_eq!(session["device"]["tick_hz"], 2_000_000);
     log.assert_each_beam_once(400);
-    let (code, said) = mock.stop();
+    let (code, printed) = mock.stop();
     assert_eq!(code, Some(0));
-    assert!(said.contains("400 firings") && said.contains("stopped"), "{said}");
+    assert!(printed.contains("400 firings") && printed.contains("stopped"), "{printed}");
     assert!(!folder.path().join("ranger").exists(), "the link goes with the mock");
 }
 

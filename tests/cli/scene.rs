@@ -85,9 +85,9 @@ fn error_in_a_very_long_line() {
     let walls = "[1,".repeat(1_000_000);
     let path = written(folder.path(), &format!("{{\"name\": \"r\", \"walls\": [1 2{walls}"));
     let refused = scene(&["check", &path]).code(2);
-    let said = &refused.get_output().stderr;
-    assert!(said.len() < 5000, "{} bytes", said.len());
-    assert!(String::from_utf8_lossy(said).contains("room.json:1:"));
+    let message = &refused.get_output().stderr;
+    assert!(message.len() < 5000, "{} bytes", message.len());
+    assert!(String::from_utf8_lossy(message).contains("room.json:1:"));
 }
 
 #[test]

@@ -16,14 +16,14 @@ use crate::{
     map::write_ideal,
 };
 
-/// What a verb says of input that it can't use.
+/// Runs a verb that must reject its input with a message that contains `part`.
 fn refused(arguments: &[&str], part: &str) {
     let output = run(arguments);
     assert_eq!(output.status.code(), Some(2), "{arguments:?}: {}", stderr(&output));
     assert!(stderr(&output).contains(part), "{arguments:?}: {}", stderr(&output));
 }
 
-/// What a verb that makes scenes printed, as a scene.
+/// Runs a verb that converts a plan and parses the printed scene.
 fn made(arguments: &[&str]) -> Scene {
     let output = run(arguments);
     assert!(output.status.success(), "{arguments:?}: {}", stderr(&output));
@@ -58,7 +58,7 @@ fn map_round_trip() {
         Scene::from_json(sonard::scene::shipped::text("two-surface-room").expect("shipped"))
             .expect("a scene");
     let middle = shipped.pose("middle").expect("a pose");
-    assert!(scene.check_pose(&middle).is_ok(), "one can stand where one stood");
+    assert!(scene.check_pose(&middle).is_ok(), "the middle stays accessible");
     // Every wall of the scene is on a wall of the room to about a cell.
     for wall in &scene.walls {
         for end in [wall.a, wall.b] {

@@ -1,4 +1,4 @@
-//! A device that says something else than it should: a mock, with somebody on its line who changes
+//! A device with wrong replies: a mock, with a proxy on its line that changes
 //! what it answers. The frames stay right.
 
 use std::{
@@ -23,7 +23,7 @@ use sonard::link::Pty;
 /// Changes a reply on its way to the host.
 pub(crate) type Change = Box<dyn FnMut(&mut Reply) + Send>;
 
-/// The line with somebody on it, until it is dropped.
+/// The line with its proxy, which runs until the value is dropped.
 pub(crate) struct Tampered {
     port: String,
     stop: Arc<AtomicBool>,
@@ -31,7 +31,7 @@ pub(crate) struct Tampered {
 }
 
 impl Tampered {
-    /// Stands between hosts and the device at `port`.
+    /// Connects the proxy between hosts and the device at `port`.
     pub(crate) fn start(port: &str, change: Change) -> Self {
         let flags = OFlags::NONBLOCK | OFlags::NOCTTY;
         let device = OpenOptions::new()
@@ -77,7 +77,7 @@ fn pass_on(pty: &Pty, mut device: File, mut change: Change, stop: &AtomicBool) {
                 let mut reply = Reply::decode(raw.body).expect("a reply");
                 change(&mut reply);
                 let frame = Frame::encode(raw.header, &reply).expect("it fits a frame");
-                // A full pty loses what nobody reads.
+                // A full pty drops unread bytes.
                 drop(pty.write(&frame));
             }
             idle = false;
@@ -88,7 +88,7 @@ fn pass_on(pty: &Pty, mut device: File, mut change: Change, stop: &AtomicBool) {
     }
 }
 
-/// What was read, if anything was there.
+/// Returns the bytes that were available, if any.
 fn some(read: std::io::Result<usize>) -> Option<usize> {
     match read {
         Ok(count) => Some(count).filter(|&count| count > 0),

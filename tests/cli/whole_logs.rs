@@ -3,18 +3,18 @@
 use std::{fs, path::Path};
 
 use crate::{
-    collect::said,
+    collect::printed,
     common::{Log, run, stderr},
 };
 
-/// Runs a command that must succeed, in words; `DIR` stands for `folder`.
+/// Runs a command line that must succeed; `DIR` is replaced by `folder`.
 #[track_caller]
 fn succeed(words: &str, folder: &Path) -> (String, String) {
     let folder = folder.to_str().expect("plain path");
     let arguments: Vec<String> = words.split(' ').map(|word| word.replace("DIR", folder)).collect();
     let output = run(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
     assert!(output.status.success(), "{words}: {}", stderr(&output));
-    (String::from_utf8(output.stdout.clone()).expect("text"), said(&output))
+    (String::from_utf8(output.stdout.clone()).expect("text"), joined_stderr(&output))
 }
 
 /// A room that does not come with the program, with the log of a scan in it; its file is gone.
@@ -38,8 +38,8 @@ fn scanned_room() -> tempfile::TempDir {
 fn scene_from_the_log() {
     let folder = scanned_room();
     let drawn = |words: &str, name: &str| {
-        let (_, said) = succeed(words, folder.path());
-        assert!(!said.contains("--scene"), "{words}: {said}");
+        let (_, printed) = succeed(words, folder.path());
+        assert!(!printed.contains("--scene"), "{words}: {printed}");
         fs::read_to_string(folder.path().join(name)).expect("written")
     };
     let svg = drawn("plot DIR/scan/scan.jsonl -o DIR/scan.svg", "scan.svg");
@@ -87,8 +87,8 @@ fn modified_scene_is_rejected() {
     let text = fs::read_to_string(&log).expect("there");
     fs::write(&log, text.replacen("\\\"reflectance\\\"", "\\\"reflectance\\\" ", 1))
         .expect("writable");
-    let (_, said) = succeed("plot DIR/scan/scan.jsonl -o DIR/scan.svg", folder.path());
-    assert!(said.contains("was changed") && said.contains("--scene"), "{said}");
+    let (_, printed) = succeed("plot DIR/scan/scan.jsonl -o DIR/scan.svg", folder.path());
+    assert!(printed.contains("was changed") && printed.contains("--scene"), "{printed}");
     let svg = fs::read_to_string(folder.path().join("scan.svg")).expect("written");
     assert!(!svg.contains("class=\"walls\""));
 }

@@ -90,7 +90,7 @@ impl From<ScansError> for CollectError {
 impl From<PrepareError> for CollectError {
     fn from(error: PrepareError) -> Self {
         match error {
-            PrepareError::WindowTooShort(deaf) => Self::invalid(deaf, deaf.help()),
+            PrepareError::WindowTooShort(error) => Self::invalid(error, error.help()),
             PrepareError::Model(error) => {
                 Self::invalid(error, "correct [sensor] in the plan, or the sensor's data")
             }

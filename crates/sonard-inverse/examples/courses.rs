@@ -86,7 +86,7 @@ fn driven_in(name: &str, count: u64, seed: u64, beams: usize) {
 
 fn drive(world: &World, atlas: &CoarseGrid, beams: usize, rng: &mut Pcg64, tally: &mut Tally) {
     let Some(mut pose) = place(&world.scene, rng) else { return };
-    let mut told = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
+    let mut reported = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
     let mut course = Tracker::new(Odometry::default());
     let mut is_again = false;
     for at in 0..SWEEPS {
@@ -94,13 +94,13 @@ fn drive(world: &World, atlas: &CoarseGrid, beams: usize, rng: &mut Pcg64, tally
             let Some(elsewhere) = place(&world.scene, rng) else { return };
             pose = elsewhere;
         } else if at > 0 {
-            (pose, told) = next(&world.scene, &pose, &told, rng);
+            (pose, reported) = next(&world.scene, &pose, &reported, rng);
         }
         let Some(all) = readings(world, &pose, 0.0, rng) else { return };
         let every = (all.len() / beams).max(1);
         let sweep = FitSweep {
             scan: Uuid::nil(),
-            pose: told,
+            pose: reported,
             beams: all.into_iter().step_by(every).collect(),
         };
         let right = equivalent_poses(world, &pose);
@@ -123,7 +123,7 @@ fn drive(world: &World, atlas: &CoarseGrid, beams: usize, rng: &mut Pcg64, tally
 }
 
 /// Drives at most half a metre, with odometry errors.
-fn next(scene: &Scene, pose: &Pose, told: &Pose, rng: &mut Pcg64) -> (Pose, Pose) {
+fn next(scene: &Scene, pose: &Pose, reported: &Pose, rng: &mut Pcg64) -> (Pose, Pose) {
     for _ in 0..100 {
         let (ahead_m, turn_deg) = (rng.random_range(0.1..LEG_M), rng.random_range(-90.0..90.0));
         let on = moved(pose, ahead_m, turn_deg);
@@ -134,10 +134,10 @@ fn next(scene: &Scene, pose: &Pose, told: &Pose, rng: &mut Pcg64) -> (Pose, Pose
             };
             let off_m = normal(0.05 * ahead_m, rng);
             let off_deg = normal(5.0 * ahead_m, rng);
-            return (on, moved(told, ahead_m + off_m, turn_deg + off_deg));
+            return (on, moved(reported, ahead_m + off_m, turn_deg + off_deg));
         }
     }
-    (*pose, *told)
+    (*pose, *reported)
 }
 
 /// Turns and drives ahead.

@@ -38,7 +38,7 @@ fn main() {
     let (count, seed, beams) = (number(0, 10), number(1, 1), number(2, BEAMS.into()) as usize);
     println!(
         "{:24} {:>7} {:>7} {:>7} {:>7} {:>10} {:>10} {:>10}",
-        "scene", "places", "right", "told", "sure", "atlas s", "median s", "95 % s"
+        "scene", "places", "right", "reported", "sure", "atlas s", "median s", "95 % s"
     );
     let is_wanted = |name: &&str| names.is_empty() || names.iter().any(|wanted| wanted == name);
     for name in shipped::names().filter(is_wanted) {
@@ -59,7 +59,7 @@ fn located_in(name: &str, count: u64, seed: u64, beams: usize) {
     };
     let atlas_s = cpu_s() - began;
     let mut rng = Pcg64::seed_from_u64(seed);
-    let (mut right, mut told, mut sure, mut times) = (0, 0, 0, Vec::new());
+    let (mut right, mut reported, mut sure, mut times) = (0, 0, 0, Vec::new());
     for _ in 0..count {
         let Some(pose) = place(&world.scene, &mut rng) else { continue };
         let Some(all) = readings(&world, &pose, 0.0, &mut rng) else { continue };
@@ -71,12 +71,12 @@ fn located_in(name: &str, count: u64, seed: u64, beams: usize) {
         let modes = locate(&world, &atlas, &sweep).unwrap_or_default();
         times.push(cpu_s() - began);
         let found = modes.iter().find(|mode| is_there(mode, &pose, beams));
-        let is_told = found.is_some() || modes.iter().any(|mode| is_told(mode, &pose, beams));
-        told += u32::from(is_told);
+        let is_reported = found.is_some() || modes.iter().any(|mode| is_told(mode, &pose, beams));
+        reported += u32::from(is_reported);
         right += u32::from(found.is_some());
         sure += u32::from(found.is_some_and(|mode| mode.probability > 0.5));
         if found.is_none() {
-            let how = if is_told { "told as unknown" } else { "not found" };
+            let how = if is_reported { "reported as unknown" } else { "not found" };
             let echoes = sweep
                 .beams
                 .iter()
@@ -94,7 +94,7 @@ fn located_in(name: &str, count: u64, seed: u64, beams: usize) {
         "{name:24} {:7} {:5.1} % {:5.1} % {:5.1} % {atlas_s:10.2} {:10.2} {:10.2}",
         times.len(),
         share(right),
-        share(told),
+        share(reported),
         share(sure),
         at(0.5),
         at(0.95)
@@ -117,7 +117,7 @@ fn is_there(mode: &PoseMode, pose: &Pose, beams: usize) -> bool {
 }
 
 /// Checks that an uncertain pose contains the truth in its 95 % interval.
-fn is_told(mode: &PoseMode, pose: &Pose, beams: usize) -> bool {
+fn is_reported(mode: &PoseMode, pose: &Pose, beams: usize) -> bool {
     // Each of three is within so many standard deviations in 98.3 % of cases, all in 95 %.
     const SIGMAS: f64 = 2.39;
     let ((x_m, y_m, turned_deg), (most_m, most_deg)) = (off(mode, pose), near(beams));
@@ -137,7 +137,7 @@ fn cpu_s() -> f64 {
         let text = std::fs::read_to_string(task.ok()?.path().join("schedstat")).ok()?;
         Some(1e-9 * text.split_whitespace().next()?.parse::<f64>().ok()?)
     };
-    let told: Option<f64> =
+    let reported: Option<f64> =
         std::fs::read_dir("/proc/self/task").ok().and_then(|tasks| tasks.map(of).sum());
-    told.unwrap_or_else(|| BEGAN.elapsed().as_secs_f64())
+    reported.unwrap_or_else(|| BEGAN.elapsed().as_secs_f64())
 }

@@ -78,9 +78,9 @@ pub(crate) enum RangeOutcome {
         /// Range, metres.
         range_m: f64,
     },
-    /// No echo, as [`Heard::Silence`].
+    /// No echo, as [`SweepOutcome::Silence`].
     NoEcho,
-    /// Target below the minimum range, as [`Heard::Near`].
+    /// Target below the minimum range, as [`SweepOutcome::Near`].
     BelowMinRange,
 }
 
@@ -142,7 +142,7 @@ impl FitSweep {
             .pings
             .iter()
             .filter_map(|ping| {
-                let heard = match ping.status {
+                let outcome = match ping.status {
                     PingStatus::Echo => {
                         let of_range = || ping.range_m.map(|range_m| range_m * tof_us_per_m);
                         FiringOutcome::Echo { tof_us: ping.tof_us.or_else(of_range)? }
@@ -153,7 +153,7 @@ impl FitSweep {
                         return None;
                     }
                 };
-                Some(SweepFiring { azimuth_deg: ping.azimuth_deg, outcome: heard })
+                Some(SweepFiring { azimuth_deg: ping.azimuth_deg, outcome })
             })
             .collect();
         if beams.len() < MIN_BEAMS {

@@ -212,7 +212,7 @@ fn help_for_reading(error: &io::Error) -> &'static str {
     use io::ErrorKind as Kind;
     match error.kind() {
         Kind::NotFound => "check the path",
-        Kind::PermissionDenied => "ask its owner for permission to read it, or read a copy",
+        Kind::PermissionDenied => "request permission to read it from its owner, or read a copy",
         Kind::IsADirectory => "name a file in that folder",
         _ => "check the disk; copy the files that are still readable",
     }

@@ -202,8 +202,8 @@ fn read(
                     (ranger.azimuth_deg(), DVec2::new(ranger.x_m, ranger.y_m));
                 let mounted = ranger.world_pose(pose);
                 let point = simulator.at(mounted.position());
-                let heard = reading(&point.ping(mounted.direction_rad(0.0))?);
-                Ok(SweepBeam { azimuth_deg, index, outcome: heard, mount })
+                let outcome = reading(&point.ping(mounted.direction_rad(0.0))?);
+                Ok(SweepBeam { azimuth_deg, index, outcome, mount })
             };
             let beams = (0..).zip(array.round()).map(beam);
             (beams.collect::<Result<_, TooCostly>>()?, RING_STEP_DEG)
@@ -212,8 +212,8 @@ fn read(
             let point = simulator.at(pose.position());
             let beam = |index: u32| {
                 let azimuth_deg = 0.9 * f64::from(index);
-                let heard = reading(&point.ping(pose.direction_rad(azimuth_deg))?);
-                Ok(SweepBeam { azimuth_deg, index, outcome: heard, mount: DVec2::ZERO })
+                let outcome = reading(&point.ping(pose.direction_rad(azimuth_deg))?);
+                Ok(SweepBeam { azimuth_deg, index, outcome, mount: DVec2::ZERO })
             };
             ((0..400).map(beam).collect::<Result<_, TooCostly>>()?, 0.9)
         }

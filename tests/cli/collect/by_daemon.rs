@@ -4,7 +4,7 @@ use std::{path::Path, process::Stdio};
 
 use serde_json::json;
 
-use super::{Case, said};
+use super::{Case, printed};
 use crate::{
     common::{Log, interrupt, run, sonard, wait_until},
     daemon::{Daemon, clean_log},
@@ -60,7 +60,7 @@ fn daemon_settings_are_restored() {
          [air]\ntemperature_c = 22.5\n[conditions]\ndoor = \"shut\"\n",
     );
     let output = collect(&case, &daemon);
-    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(0), "{}", joined_stderr(&output));
     case.assert_each_scan_once(2, 2, 25);
     let log = case.scan("p002-r01.jsonl");
     let session = log.of_type("session").next().expect("a session");
@@ -90,7 +90,7 @@ fn daemon_settings_are_restored() {
     );
     assert_eq!(case.entries("saved_settings")[0]["scanning"]["mode"], "continuous");
     let again = collect(&case, &daemon);
-    assert_eq!(again.status.code(), Some(0), "{}", said(&again));
+    assert_eq!(again.status.code(), Some(0), "{}", joined_stderr(&again));
     assert_eq!(daemon.stop(), Some(0));
     let all = clean_log(folder.path());
     let requested: Vec<_> =
@@ -116,7 +116,7 @@ fn conflicting_settings() {
     ] {
         let case = Case::new(&format!("{poses}{plan}"));
         let output = collect(&case, &daemon);
-        let text = said(&output);
+        let text = joined_stderr(&output);
         assert_eq!(output.status.code(), Some(2), "{text}");
         assert!(parts.iter().all(|part| text.contains(part)), "{text}");
         assert!(!text.contains("motion.speed"), "that is the same: {text}");
@@ -125,23 +125,23 @@ fn conflicting_settings() {
     let case = Case::new("");
     let place = "[place]\nscene = \"simple-room\"\n[plan]\nto_deg = 90\n[sensor]\n";
     case.write("plan.toml", &format!("{place}sensor = \"pioneer\"\nmax_range_m = 3\n{poses}"));
-    let text = said(&collect(&case, &daemon));
+    let text = joined_stderr(&collect(&case, &daemon));
     assert!(text.contains("sensor pioneer is not the daemon's senscomp-6500"), "{text}");
     assert!(text.contains("model.max_range_m of the daemon 1.5"), "{text}");
     case.write("plan.toml", "[place]\nscene = \"corridor\"\n[poses]\nlist = [\"beside-wall\"]\n");
-    let text = said(&collect(&case, &daemon));
+    let text = joined_stderr(&collect(&case, &daemon));
     assert!(text.contains("its scene simple-room"), "{text}");
     let mock = run(&["collect", "plan.toml", "--daemon", "--seed", "3"]);
     assert_eq!(mock.status.code(), Some(2));
     assert_eq!(daemon.stop(), Some(0));
-    // Without one it says where it looked, and with one that measures nothing it says that.
+    // Without a daemon the message names the socket, with one that does not measure its state.
     let case = Case::new(poses);
     let output = case.collect(&["--daemon", "--socket", "/nowhere"]);
-    assert!(output.status.code() == Some(3) && said(&output).contains("/nowhere"));
+    assert!(output.status.code() == Some(3) && joined_stderr(&output).contains("/nowhere"));
     let array = ["--simulate", "--scene", "mcgill-lab", "--pose", "fig4"];
     let daemon = Daemon::start(folder.path(), &array);
     let output = collect(&case, &daemon);
-    let text = said(&output);
+    let text = joined_stderr(&output);
     assert!(output.status.code() == Some(2) && text.contains("simulates an array"), "{text}");
     assert_eq!(daemon.stop(), Some(0));
 }
@@ -155,7 +155,7 @@ fn resumes_and_restores_the_daemon() {
     wait_until("a scan", || is_taking(&case));
     killed.kill().expect("it runs");
     killed.wait().expect("it ends");
-    assert_eq!(daemon.status()["scanning"]["mode"], "on-request", "nobody could give it back");
+    assert_eq!(daemon.status()["scanning"]["mode"], "on-request", "the mode is not restored");
 
     let stopped = spawn(&case, &daemon);
     // The daemon may still be at the scan of the one that was killed, which is set aside first.
@@ -164,11 +164,11 @@ fn resumes_and_restores_the_daemon() {
     });
     assert_eq!(daemon.send("POST", "/v1/stop", "").status, 202);
     let output = stopped.wait_with_output().expect("it ends");
-    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(1), "{}", joined_stderr(&output));
     assert!(
-        said(&output).contains("the daemon was stopped by another client"),
+        joined_stderr(&output).contains("the daemon was stopped by another client"),
         "{}",
-        said(&output)
+        joined_stderr(&output)
     );
     assert_eq!(daemon.status()["scanning"]["mode"], "continuous");
 
@@ -176,12 +176,12 @@ fn resumes_and_restores_the_daemon() {
     wait_until("a scan", || is_taking(&case));
     interrupt(interrupted.id());
     let output = interrupted.wait_with_output().expect("it ends");
-    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(1), "{}", joined_stderr(&output));
     assert_eq!(case.files("in-progress"), Vec::<String>::new());
     assert_eq!(daemon.status()["scanning"]["mode"], "continuous");
 
     let output = collect(&case, &daemon);
-    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(0), "{}", joined_stderr(&output));
     case.assert_each_scan_once(1, 4, 25);
     let cut: Vec<Log> = case
         .files("rejected")
@@ -203,7 +203,7 @@ fn waits_for_a_lost_daemon() {
     first.kill();
     let second = daemon(folder.path(), &[]);
     let output = child.wait_with_output().expect("it ends");
-    assert_eq!(output.status.code(), Some(0), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(0), "{}", joined_stderr(&output));
     case.assert_each_scan_once(1, 3, 25);
     assert_eq!(second.status()["scanning"]["mode"], "continuous");
     assert_eq!(second.stop(), Some(0));

@@ -1,8 +1,8 @@
-//! What is looked at between scans, and what is done about it.
+//! Checks between scans and their actions.
 
 use std::thread;
 
-use super::{Case, said};
+use super::{Case, printed};
 use crate::common::{stderr, wait_until};
 
 const POSE: &str = "[poses]\nlist = [\"fig9\"]\n";
@@ -44,7 +44,7 @@ fn retakes_exhausted() {
     assert_eq!(case.manifest()["counts"]["given_up"], 2);
     let report = case.text("out/report.md");
     assert!(report.contains("## Failed") && report.contains("Scanning time 0 s"), "{report}");
-    // They stay given up, until somebody wants them.
+    // They stay abandoned until they are requested.
     case.collect(&[]);
     assert_eq!(case.files("scans").len(), 0);
     case.collect_all(&["--retry-failed"]);
@@ -52,7 +52,7 @@ fn retakes_exhausted() {
 
     let case = Case::new(&(plan + "after_retakes = \"stop\"\n"));
     let output = case.collect(&["--missed-steps", "1"]);
-    assert!(output.status.code() == Some(1) && said(&output).contains("2 retakes failed"));
+    assert!(output.status.code() == Some(1) && joined_stderr(&output).contains("2 retakes failed"));
     assert_eq!(case.files("rejected").len(), 3);
 
     let case = Case::new(&format!("{POSE}[checks]\non_home_drift = \"note\"\n"));
@@ -66,7 +66,7 @@ fn missing_beams_and_wrong_scene() {
         "{POSE}[collection]\nretakes = 0\n[checks]\nmax_unexplained_share = 0.3\non_unexplained = \"stop\"\n"
     ));
     let output = case.collect(&["--truth", "corridor"]);
-    let text = said(&output);
+    let text = joined_stderr(&output);
     assert!(output.status.code() == Some(1) && text.contains("check pose and scene"), "{text}");
     assert_eq!(case.files("rejected").len(), 1);
     case.collect_all(&[]);
@@ -74,7 +74,11 @@ fn missing_beams_and_wrong_scene() {
     let case = Case::new(&format!("{POSE}[collection]\nretakes = 40\n"));
     let output = case.collect_all(&["--faults", "stuck_echo=0.04"]);
     case.assert_each_scan_once(1, 1, 25);
-    assert!(said(&output).contains("have no usable reading: to be retaken"), "{}", stderr(&output));
+    assert!(
+        joined_stderr(&output).contains("have no usable reading: to be retaken"),
+        "{}",
+        stderr(&output)
+    );
 }
 
 #[test]
@@ -96,7 +100,7 @@ fn drifting_air_starts_a_session() {
     );
     let output = case.collect_all(&[]);
     case.assert_each_scan_once(2, 2, 25);
-    assert!(said(&output).contains("+6.00 C from the session's"), "{}", stderr(&output));
+    assert!(joined_stderr(&output).contains("+6.00 C from the session's"), "{}", stderr(&output));
     for (name, temperature_c, speed) in
         [("p001-r02.jsonl", 20.0, 343.99), ("p002-r01.jsonl", 26.0, 347.6)]
     {
@@ -115,7 +119,8 @@ fn drifting_air_starts_a_session() {
     std::fs::write(&thermometer, "20000\n").expect("writable");
     let output = case.collect(&[]);
     assert!(
-        output.status.code() == Some(1) && said(&output).contains("stopped: air temperature 26.00")
+        output.status.code() == Some(1)
+            && joined_stderr(&output).contains("stopped: air temperature 26.00")
     );
     assert_eq!(case.files("scans").len(), 2);
 }
@@ -128,7 +133,7 @@ fn air_change_within_a_scan() {
     case.write("plan.toml", &plan);
     case.write("thermometer", "20000\n");
     let taking = case.path("out/in-progress/p001-r01.jsonl");
-    // Somebody opens a door during the first scan.
+    // A door opens during the first scan.
     let warming = thread::spawn(move || {
         wait_until("the scan", || taking.exists());
         std::fs::write(&thermometer, "17000\n").expect("writable");
@@ -136,7 +141,7 @@ fn air_change_within_a_scan() {
     let output = case.collect_all(&["--realtime"]);
     warming.join().expect("no panic");
     assert!(
-        said(&output).contains("-3.00 C during the scan: to be retaken"),
+        joined_stderr(&output).contains("-3.00 C during the scan: to be retaken"),
         "{}",
         stderr(&output)
     );

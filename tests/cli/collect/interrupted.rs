@@ -11,7 +11,7 @@ use std::{
 
 use rand::{RngExt as _, SeedableRng as _};
 
-use super::{Case, said};
+use super::{Case, printed};
 use crate::{
     common::{MockProcess, interrupt, sonard, stderr, wait_until},
     daemon::rig::limit_files,
@@ -94,7 +94,7 @@ fn resumes_after_full_disk() {
     wait_until("a scan", || case.path("out/scans/p001-r01.jsonl").exists());
     limit_files(child.id(), Some(6_000));
     let output = child.wait_with_output().expect("it ends");
-    let text = said(&output);
+    let text = joined_stderr(&output);
     assert!(output.status.code() == Some(3) && text.contains("file-size limit"), "{text}");
     case.collect_all(&[]);
     case.assert_each_scan_once(1, 4, 25);
@@ -147,7 +147,7 @@ fn failing_ranger_backs_off() {
     let plan = "[poses]\nlist = [\"fig9\"]\n[collection]\nrepeats = 20\nretry_limit_s = 8\n";
     let case = Case::new(plan);
     let output = case.collect(&["--faults", "reset=1"]);
-    let text = said(&output);
+    let text = joined_stderr(&output);
     assert_eq!(output.status.code(), Some(3), "{text}");
     assert!(text.contains("supply"), "{text}");
     let tries = text.matches("ranger lost").count();
@@ -166,7 +166,7 @@ fn folder_is_locked() {
         case.path("out/in-progress").exists() && !case.files("in-progress").is_empty()
     });
     let second = case.collect(&[]);
-    let text = said(&second);
+    let text = joined_stderr(&second);
     assert!(second.status.code() == Some(3) && text.contains("another process"), "{text}");
     assert_eq!(child.wait().expect("it ends").code(), Some(0));
     case.assert_each_scan_once(1, 3, 25);

@@ -1,6 +1,6 @@
-//! Plans: whole, wrong, changed; what they are said to take, and what they take.
+//! Plans: complete, wrong and changed; predicted and actual durations.
 
-use super::{Case, said};
+use super::{Case, printed};
 use crate::common::{run, stderr};
 
 #[test]
@@ -40,14 +40,14 @@ fn report_and_manifest() {
     assert_eq!(again.status.code(), Some(0), "{}", stderr(&again));
     assert_eq!(case.verify().0, Some(0));
 
-    // Report and manifest can be made anew, and are the same but for their time.
+    // Report and manifest can be written again and differ in their time only.
     let out = case.path("out");
-    let anew = |path: &str| run(&["collect", "--report", path]).status.code();
-    assert_eq!(anew(out.to_str().expect("plain path")), Some(0));
+    let rewrite = |path: &str| run(&["collect", "--report", path]).status.code();
+    assert_eq!(rewrite(out.to_str().expect("plain path")), Some(0));
     assert_eq!((case.text("out/report.md"), case.verify().0), (report, Some(0)));
-    assert_eq!(anew("/nowhere"), Some(2));
+    assert_eq!(rewrite("/nowhere"), Some(2));
 
-    for (change, said) in [
+    for (change, printed) in [
         ("scans/p001-r01.jsonl", "p001-r01.jsonl: changed"),
         ("journal.jsonl", "journal.jsonl: changed"),
         ("report/drift.svg", "drift.svg: changed"),
@@ -56,7 +56,7 @@ fn report_and_manifest() {
         let before = case.text(&name);
         case.write(&name, &before.replacen('0', "1", 1));
         let (code, text) = case.verify();
-        assert!(code == Some(1) && text.contains(said), "{change}: {text}");
+        assert!(code == Some(1) && text.contains(printed), "{change}: {text}");
         case.write(&name, &before);
     }
     case.write("out/scans/p009-r01.jsonl", "");
@@ -88,7 +88,7 @@ fn wrong_plans() {
     ] {
         let case = Case::new(plan);
         let output = case.collect(&[]);
-        let plain = said(&output);
+        let plain = joined_stderr(&output);
         let wanted = if plan.contains("/nowhere") { Some(3) } else { Some(2) };
         assert_eq!(output.status.code(), wanted, "{plan}: {plain}");
         assert!(plain.contains(place) && plain.contains(help), "{plan}: {plain}");
@@ -96,7 +96,7 @@ fn wrong_plans() {
     }
     let case = Case::new("[poses]\nlist = [\"fig9\"]\n");
     let output = run(&["collect", case.path("plan.toml").to_str().expect("plain path")]);
-    assert!(output.status.code() == Some(2) && said(&output).contains("no device"));
+    assert!(output.status.code() == Some(2) && joined_stderr(&output).contains("no device"));
 }
 
 #[test]
@@ -111,7 +111,7 @@ fn changed_plan() {
     case.collect_all(&[]);
     case.write("plan.toml", &(plan(", \"fig7\"") + "repeats = 2\n"));
     let refused = case.collect(&[]);
-    let text = said(&refused);
+    let text = joined_stderr(&refused);
     assert_eq!(refused.status.code(), Some(2), "{text}");
     assert!(text.contains("collection.repeats changed from 1 to 2"), "{text}");
     let before = case.text("out/scans/p001-r01.jsonl");
@@ -129,8 +129,8 @@ fn estimate_matches_the_duration() {
     let turn = ["--set", "plan.to_deg=360"];
     let output = case.collect(&[&turn[..], &["--plan-only", "--json"]].concat());
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    let said: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
-    let (scan, total) = (&said["scan"], &said["total"]);
+    let printed: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let (scan, total) = (&printed["scan"], &printed["total"]);
     let figure = |value: &serde_json::Value| value.as_f64().expect("a figure");
     // 100 windows of 3 m there and back at 343.99 m/s, no less than 20 ms apart.
     let acoustics_s = figure(&scan["acoustics_s"]);
@@ -138,7 +138,7 @@ fn estimate_matches_the_duration() {
     let parts = ["acoustics_s", "motor_s", "link_s"].map(|part| figure(&scan[part]));
     assert!((parts.iter().sum::<f64>() - figure(&scan["total_s"])).abs() < 1e-9);
     assert!((figure(&total["total_s"]) - 3.0 * figure(&scan["total_s"]) - 0.4).abs() < 1e-9);
-    assert!(!case.path("out").exists(), "it was only asked");
+    assert!(!case.path("out").exists(), "a dry run writes nothing");
 
     case.collect_all(&[&turn[..], &["--realtime"]].concat());
     let takes = case.entries("attempt");
@@ -149,7 +149,7 @@ fn estimate_matches_the_duration() {
     // A busy computer keeps one scan or another waiting, so the middle one counts.
     let median_s = measured[1];
     assert!((median_s / estimated_s - 1.0).abs() < 0.03, "{median_s} s, {estimated_s} s estimated");
-    // The files are about as large as was said.
+    // The files have about the predicted size.
     let bytes: u64 = case.manifest()["files"]
         .as_array()
         .expect("files")
@@ -157,6 +157,6 @@ fn estimate_matches_the_duration() {
         .filter(|file| file["scan"].is_object())
         .map(|file| file["bytes"].as_u64().expect("a size"))
         .sum();
-    let said = figure(&total["disk_bytes"]);
-    assert!((bytes as f64 / said - 1.0).abs() < 0.3, "{bytes} bytes, {said} estimated");
+    let printed = figure(&total["disk_bytes"]);
+    assert!((bytes as f64 / printed - 1.0).abs() < 0.3, "{bytes} bytes, {printed} estimated");
 }

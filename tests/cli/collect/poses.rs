@@ -2,7 +2,7 @@
 
 use std::{io::Write as _, process::Stdio};
 
-use super::{Case, said};
+use super::{Case, printed};
 use crate::common::{sonard, stderr};
 
 /// Collects with these lines on standard input.
@@ -26,10 +26,10 @@ fn prompted_poses_and_conditions() {
         "[poses]\nprompt = true\nconfirm = true\n[collection]\nrepeats = 2\n\
          [ask]\nat_start = [\"operator\"]\nat_pose = [\"door\"]\n",
     );
-    // First pose, operator, consent, door; a pose in the wall is asked for again; then the second.
+    // First pose, operator, consent, door; a pose in the wall prompts again; then the second.
     let lines = "fig9\nAda\n\nopen\n5,5,0\n0.5,0.3,90\n\nshut\n\n";
     let output = answered(&case, lines, &[]);
-    let text = said(&output);
+    let text = joined_stderr(&output);
     assert_eq!(output.status.code(), Some(0), "{text}");
     assert!(text.contains("pose 3 (X,Y,DEG") && text.contains("put the ranger at fig9"), "{text}");
     case.assert_each_scan_once(2, 2, 25);
@@ -51,7 +51,7 @@ fn prompt_about_a_failed_check() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     assert_eq!(case.files("rejected"), ["p001-r01-attempt1.jsonl"]);
     case.assert_each_scan_once(1, 1, 25);
-    // Nobody there: it stops, and nothing is lost.
+    // Without a terminal it stops, and nothing is lost.
     let case = Case::new(plan);
     let output = answered(&case, "", &["--missed-steps", "1"]);
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
@@ -78,7 +78,7 @@ fn poses_from_programs() {
         let case = Case::new(&format!("[poses]\nprogram = \"{command}\"\n"));
         let output = case.collect(&[]);
         assert!(
-            output.status.code() == Some(2) && said(&output).contains(part),
+            output.status.code() == Some(2) && joined_stderr(&output).contains(part),
             "{}",
             stderr(&output)
         );
@@ -97,8 +97,10 @@ fn poses_from_a_file() {
     assert_eq!(case.manifest()["poses"]["1"]["conditions"]["door"], "open");
     case.write("poses.csv", "name,x_m,y_m,heading_deg\na,0.5,0.3,0\nb,0.6,0.25,45\n");
     let output = case.collect(&[]);
-    assert!(output.status.code() == Some(2) && said(&output).contains("poses in the file"));
+    assert!(
+        output.status.code() == Some(2) && joined_stderr(&output).contains("poses in the file")
+    );
     case.write("poses.csv", "name,x_m,y_m,heading_deg\na,0.5,0.3,0\nb,zero,0.25,45\n");
     let output = case.collect(&[]);
-    assert!(said(&output).contains("poses.csv:3:"), "{}", stderr(&output));
+    assert!(joined_stderr(&output).contains("poses.csv:3:"), "{}", stderr(&output));
 }

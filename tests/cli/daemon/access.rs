@@ -1,4 +1,4 @@
-//! Strangers, floods and clients that dawdle: refused, while the scan goes on.
+//! Foreign origins, floods and slow clients are rejected while the scan continues.
 
 use std::{
     io::{Read as _, Write as _},
@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{Daemon, Reply, ask, read_reply, write_token};
+use super::{Daemon, Reply, read_reply, request, write_token};
 use crate::common::wait_until;
 
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
@@ -25,7 +25,7 @@ fn start(folder: &std::path::Path, further: &[&str]) -> Daemon {
         "scanning.mode=continuous",
     ];
     let daemon = Daemon::start_mock(folder, &[&tcp, further].concat());
-    wait_until("the address", || daemon.said().contains("http://"));
+    wait_until("the address", || daemon.messages().contains("http://"));
     daemon
 }
 
@@ -63,7 +63,7 @@ fn foreign_origins_are_rejected() {
         ("GET", "/page/%ff", vec![host], "", 400),
         ("GET", "/v1/status", vec![host, ("Sec-Fetch-Site", "cross-site")], "", 403),
     ] {
-        let reply = ask(daemon.connect_tcp(), method, path, &headers, body);
+        let reply = send_request(daemon.connect_tcp(), method, path, &headers, body);
         assert_eq!(reply.status, status, "{method} {path} {headers:?}: {}", reply.json());
         if status >= 400 {
             assert_problem(&reply, path);
@@ -107,7 +107,8 @@ fn slow_and_excess_clients() {
         stream.write_all(b"GET /v1/status HTTP/1.1\r\nHost: local").expect("it listens");
     }
     std::thread::sleep(Duration::from_millis(300));
-    let by_tcp = || ask(daemon.connect_tcp(), "GET", "/v1/status", &[("Host", "localhost")], "");
+    let by_tcp =
+        || send_request(daemon.connect_tcp(), "GET", "/v1/status", &[("Host", "localhost")], "");
     assert_eq!(by_tcp().status, 200);
     let mut one_more = daemon.connect_tcp();
     one_more.write_all(b"GET /v1/status HTTP/1.1\r\nHost: local").expect("it listens");
@@ -148,12 +149,12 @@ fn request_rate_limit() {
     wait_until("beams", || beams(&daemon) > 0);
 }
 
-/// What every refusal is, whoever makes it.
+/// Checks the format of a rejection.
 fn assert_problem(reply: &Reply, of: &str) {
     assert!(reply.head.contains("content-type: application/json"), "{of}: {}", reply.head);
     let problem = reply.json();
-    let says = |name: &str| problem[name].as_str().is_some_and(|text| !text.is_empty());
-    assert!(says("error") && says("help"), "{of}: {problem}");
+    let has_text = |name: &str| problem[name].as_str().is_some_and(|text| !text.is_empty());
+    assert!(has_text("error") && has_text("help"), "{of}: {problem}");
 }
 
 #[test]

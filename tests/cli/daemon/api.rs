@@ -1,4 +1,4 @@
-//! What the API says and does.
+//! The API's answers, held against its document.
 
 mod clients;
 mod orders;
@@ -36,7 +36,7 @@ fn responses_match_the_openapi() {
         fs::write(folder.path().join(name), "a page").expect("there is room");
     }
     let playground = format!("server.playground={}", folder.path().display());
-    let others = ["--set", "fleet.daemons=/nobody/is/there"];
+    let others = ["--set", "fleet.daemons=/nowhere/at/all"];
     let further = [&SHORT[..], &["--set", &playground], &others].concat();
     let daemon = Daemon::start_mock(folder.path(), &further);
     let document = daemon.get("/v1/openapi.json").json();
@@ -47,10 +47,10 @@ fn responses_match_the_openapi() {
     let log = daemon.get("/v1/logs").json()[0]["name"].as_str().expect("a log").to_owned();
     let latest = daemon.get("/v1/scan/latest").json();
     let scan = latest["start"]["scan"].as_str().expect("an id").to_owned();
-    let asked = daemon.send("POST", "/v1/start", r#"{"scans":20}"#).json();
+    let requested = daemon.send("POST", "/v1/start", r#"{"scans":20}"#).json();
     let bodies = [
         ("/v1/start", json!({"scans": 1})),
-        ("/v1/cancel", json!({"request": asked["request"]})),
+        ("/v1/cancel", json!({"request": requested["request"]})),
         ("/v1/scanning", json!({"mode": "on-request"})),
         ("/v1/stop", json!({})),
         ("/v1/plan", json!({"from_deg": 0.0, "to_deg": 9.0, "step_deg": 0.9, "pings_per_stop": 1})),
@@ -94,9 +94,9 @@ fn responses_match_the_openapi() {
                 reply.status
             );
             let mut kinds = content.as_object().expect("content").iter();
-            let says = |media: &str| reply.head.contains(&format!("content-type: {media}"));
+            let has_text = |media: &str| reply.head.contains(&format!("content-type: {media}"));
             let (media, schema) = kinds
-                .find(|(media, _)| says(media))
+                .find(|(media, _)| has_text(media))
                 .unwrap_or_else(|| panic!("{path}: {}", reply.head));
             if media == "application/json" {
                 let faults = misfits(&schema["schema"], &document, &reply.json());
@@ -113,7 +113,7 @@ fn responses_match_the_openapi() {
     assert_eq!(daemon.get("/v1/scans").status, 200);
     let figures = String::from_utf8(daemon.get("/metrics").body).expect("text");
     assert!(figures.contains("\nsonard_simulated 1"), "a mock measures nothing: {figures}");
-    // Refusals are as the document says, too.
+    // Rejections follow the document, too.
     for (method, path, body, status) in [
         ("GET", "/v1/nothing", "", 404),
         ("GET", "/v1/logs/..%2F..%2Fetc%2Fpasswd", "", 404),
@@ -158,7 +158,7 @@ fn responses_match_the_openapi() {
     assert_eq!(daemon.stop(), Some(0));
 }
 
-/// What the server writes is what its clients read: the same types, and nothing lost on the way.
+/// Answers deserialize into the client's types without loss.
 #[test]
 fn responses_deserialize() {
     fn same<T: Serialize + DeserializeOwned>(path: &str, answer: &Value) {
@@ -173,8 +173,8 @@ fn responses_deserialize() {
     daemon.wait_for("ready");
     same::<Started>("/v1/start", &daemon.send("POST", "/v1/start", r#"{"scans":1}"#).json());
     daemon.wait_for_scans(1);
-    let asked = daemon.send("POST", "/v1/start", r#"{"scans":2}"#);
-    assert_eq!(asked.status, 202);
+    let requested = daemon.send("POST", "/v1/start", r#"{"scans":2}"#);
+    assert_eq!(requested.status, 202);
     assert_eq!(daemon.send("PUT", "/v1/air", r#"{"temperature_c":22.5}"#).status, 202);
     let scan = daemon.get("/v1/scan/latest").json()["start"]["scan"].clone();
     let scan = format!("/v1/scans/{}", scan.as_str().expect("an id"));
@@ -199,13 +199,13 @@ fn responses_deserialize() {
     daemon.stop();
 }
 
-/// Both forms of a stream carry what the document says.
+/// Both forms of a stream follow the document.
 fn check_stream(daemon: &Daemon, path: &str, content: &Value, document: &Value) {
     for (format, media, prefix) in
         [("ndjson", "application/x-ndjson", ""), ("sse", "text/event-stream", "data: ")]
     {
         let mut stream = daemon.connect().expect("it listens");
-        // Of records, a reading with all that is told beside it has the most to be held to.
+        // A reading with its annotations is the record with most fields.
         let (verdicts, kind) = if path == "/v1/live/records" {
             ("&verdicts=true", json!("ping"))
         } else {
@@ -299,7 +299,7 @@ fn log_byte_ranges() {
     let whole = fs::read(&log).expect("readable");
     let get = |range: &str| {
         let headers = [("Host", "localhost"), ("Range", range)];
-        super::ask(daemon.connect().expect("it listens"), "GET", &path, &headers, "")
+        super::send_request(daemon.connect().expect("it listens"), "GET", &path, &headers, "")
     };
     let reply = get("bytes=100-");
     assert_eq!((reply.status, &reply.body[..]), (206, &whole[100..]));

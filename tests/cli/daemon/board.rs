@@ -136,7 +136,7 @@ fn play(rig: &mut Rig, runtime: &Runtime, daemon: &Handle, switches: &Switches) 
     drop(silent);
     switches.home_open.store(true, SeqCst);
     rig.plug("", 1);
-    wait_until("doubt", || state() == LinkState::Down(Trouble::Fault));
+    wait_until("the fault", || state() == LinkState::Down(Trouble::Fault));
     switches.home_open.store(false, SeqCst);
     scans(3);
     assert!(switches.power.load(SeqCst) && switches.light.load(SeqCst));
@@ -149,7 +149,7 @@ fn play(rig: &mut Rig, runtime: &Runtime, daemon: &Handle, switches: &Switches) 
     assert_eq!((state(), daemon.health().scans.beams), (LinkState::EmergencyStop, beams));
     let refused = runtime.block_on(daemon.order(start()));
     assert!(refused.is_err_and(|refusal| refusal.message.contains("emergency stop")));
-    // Released, it waits for somebody to start it.
+    // After the release it waits for a start request.
     switches.pressed.store(false, SeqCst);
     wait_until("the release", || state() == LinkState::AwaitingStart);
     let trouble = daemon.status().link.error;

@@ -282,9 +282,9 @@ fn random_faults_lose_no_reading() {
     is_over.store(true, Ordering::Relaxed);
     chaos.daemon.signal(Signal::TERM);
     let code = chaos.daemon.child.wait().expect("it ends").code();
-    assert_eq!(code, Some(0), "{}", chaos.daemon.said());
+    assert_eq!(code, Some(0), "{}", chaos.daemon.messages());
     follower.join().expect("no panic");
-    let messages = chaos.daemon.said();
+    let messages = chaos.daemon.messages();
     assert!(!messages.contains("panicked") && !messages.contains("internal error"), "{messages}");
     let (mut logged, mut lines, mut repeated) = (HashSet::new(), HashSet::new(), 0);
     let copies = chaos.copies.iter().map(|copy| (copy.clone(), true));

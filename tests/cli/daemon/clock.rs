@@ -1,4 +1,4 @@
-//! The computer's wall clock is set while the daemon runs. `libfaketime` stands between it and the
+//! Steps of the computer's wall clock while the daemon runs. `libfaketime` is loaded between it and the
 //! clock; without that library, `FAKETIME=0` leaves the test out.
 
 use std::{
@@ -12,7 +12,7 @@ use jiff::Timestamp;
 use super::{Daemon, clean_log};
 use crate::common::{Log, sonard, wait_until};
 
-/// Where Debian puts it, on any architecture.
+/// Path of the library in Debian, for any architecture.
 fn library() -> PathBuf {
     let folders = fs::read_dir("/usr/lib").expect("a folder").flatten();
     let mut places = folders.map(|folder| folder.path().join("faketime/libfaketime.so.1"));
@@ -21,7 +21,7 @@ fn library() -> PathBuf {
     )
 }
 
-/// The program with a clock that is off by what a file says.
+/// Program whose clock has the offset in a file.
 fn with_clock(arguments: &[&str], offset: &Path) -> Command {
     fs::write(offset, "+0").expect("writable");
     let mut command = sonard(arguments);
@@ -68,7 +68,7 @@ fn clock_step_within_a_scan() {
     assert!(steps.len() == 1 && steps[0].contains("+3600.0"), "{steps:?}");
     let step = log.records.iter().position(|record| record["kind"] == "clock_step");
     let end = log.records.iter().position(|record| record["type"] == "scan_end");
-    assert!(step < end, "it is told within the scan that it happened in");
+    assert!(step < end, "logged within the scan of the step");
     let mut times: Vec<Timestamp> = log.pings()[..100]
         .iter()
         .map(|ping| ping["time"].as_str().expect("a time").parse().expect("a time"))
@@ -147,7 +147,8 @@ fn ages_ignore_clock_steps() {
                 assert!((-0.2..20.0).contains(&age_s), "{offset_s}, {name}: {age_s}");
             }
             for figure in ["sonard_last_scan_age_seconds ", "sonard_reading_lateness_seconds "] {
-                let line = figures.lines().find(|line| line.starts_with(figure)).expect("told");
+                let line =
+                    figures.lines().find(|line| line.starts_with(figure)).expect("the metric");
                 let value: f64 = line[figure.len()..].parse().expect("a number");
                 assert!((-0.2..20.0).contains(&value), "{offset_s}, {line}");
             }

@@ -30,13 +30,13 @@ fn shipped_file_keeps_defaults() {
         .env("RUNTIME_DIRECTORY", "/run/sonard/front")
         .output()
         .expect("the program starts");
-    let said = String::from_utf8_lossy(&output.stdout);
+    let printed = String::from_utf8_lossy(&output.stdout);
     for part in [
         "folder = \"/var/lib/sonard/front\"",
         "socket = \"/run/sonard/front/sonard.sock\"",
         "mode = \"continuous\"",
     ] {
-        assert!(said.contains(part), "no {part} in {said}{}", stderr(&output));
+        assert!(printed.contains(part), "no {part} in {printed}{}", stderr(&output));
     }
 }
 
@@ -86,10 +86,10 @@ fn wrong_configurations() {
         let output = sonard(&arguments).args(further).env_remove("SONARD_PLAN_STEP_DEG").output();
         let output = output.expect("the program starts");
         // A terminal's width breaks lines where it likes.
-        let said = stderr(&output).replace("\n  │ ", "").replace('\n', " ");
-        assert_eq!(output.status.code(), Some(2), "{text}: {said}");
+        let printed = stderr(&output).replace("\n  │ ", "").replace('\n', " ");
+        assert_eq!(output.status.code(), Some(2), "{text}: {printed}");
         for part in parts {
-            assert!(said.contains(part), "{text}: no {part:?} in {said}");
+            assert!(printed.contains(part), "{text}: no {part:?} in {printed}");
         }
     }
     let missing = run(&["run", "--check", "--config", "/no/such.toml"]);
@@ -164,16 +164,16 @@ fn unusable_token_files() {
         let key = format!("server.token_file={token}");
         let mock = ["run", "--mock", "--scene", "simple-room", "--pose", "fig9", "--set", &key];
         let output = run(&[&mock[..], &["--log", &path("log"), "--socket", &path("s")]].concat());
-        let said = stderr(&output).replace("\n  │ ", "").replace('\n', " ");
-        assert_eq!(output.status.code(), Some(2), "{token}: {said}");
-        said
+        let printed = stderr(&output).replace("\n  │ ", "").replace('\n', " ");
+        assert_eq!(output.status.code(), Some(2), "{token}: {printed}");
+        printed
     };
     let mode = |mode: u32| fs::set_permissions(&token, fs::Permissions::from_mode(mode));
     mode(0o640).expect("it is ours");
-    let said = start(&token.display().to_string());
-    assert!(said.contains("chmod 600") && said.contains("640"), "{said}");
-    let said = start("/dev/zero");
-    assert!(said.contains("not a regular file"), "{said}");
+    let printed = start(&token.display().to_string());
+    assert!(printed.contains("chmod 600") && printed.contains("640"), "{printed}");
+    let printed = start("/dev/zero");
+    assert!(printed.contains("not a regular file"), "{printed}");
     // The same file in a client's hands.
     let status = ["status", "--address", "localhost:1", "--token-file", "/dev/zero"];
     assert_eq!(run(&status).status.code(), Some(2));

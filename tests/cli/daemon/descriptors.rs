@@ -60,7 +60,7 @@ fn descriptors_are_reserved() {
     clean_log(folder.path());
 }
 
-/// Whether a request is answered: a client beyond the limit gets 503, or its connection is closed.
+/// Returns `true` if a request is answered: a client beyond the limit gets 503, or its connection is closed.
 fn is_answered(daemon: &Daemon) -> bool {
     let Ok(mut client) = daemon.connect() else { return false };
     let request = b"GET /v1/health HTTP/1.0\r\nHost: localhost\r\n\r\n";

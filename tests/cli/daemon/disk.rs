@@ -72,8 +72,8 @@ fn failed_sync_starts_a_new_log() {
     std::thread::sleep(Duration::from_secs(1));
     assert!(daemon.status()["log"]["error"].is_string());
     assert_eq!(logs(folder.path()).len(), 1);
-    let reports = |daemon: &Daemon| daemon.said().matches("scanning is paused").count();
-    assert_eq!(reports(&daemon), 1, "{}", daemon.said());
+    let reports = |daemon: &Daemon| daemon.messages().matches("scanning is paused").count();
+    assert_eq!(reports(&daemon), 1, "{}", daemon.messages());
     set(folder.path(), "eio", false);
     wait_until("recovery", || daemon.status()["log"]["error"].is_null());
     let scans = daemon.health()["scans"]["completed"].as_u64().expect("a count");
@@ -106,9 +106,9 @@ fn hanging_sync() {
     let mut daemon = daemon;
     daemon.signal(rustix::process::Signal::TERM);
     let code = daemon.child.wait().expect("it ends").code();
-    assert_eq!(code, Some(3), "{}", daemon.said());
+    assert_eq!(code, Some(3), "{}", daemon.messages());
     assert!(since.elapsed() < Duration::from_secs(40), "longer than the unit allows");
-    assert!(daemon.said().contains("not synced"), "{}", daemon.said());
+    assert!(daemon.messages().contains("not synced"), "{}", daemon.messages());
     set(&faults, "slow", false);
     clean_log(folder.path());
 }
@@ -120,7 +120,7 @@ fn missing_folder_sync_is_a_warning() {
     fs::create_dir_all(&faults).expect("a folder");
     set(folder.path(), "nodirsync", true);
     let daemon = start(folder.path());
-    wait_until("the warning", || daemon.said().contains("cannot sync folders"));
+    wait_until("the warning", || daemon.messages().contains("cannot sync folders"));
     assert_eq!(daemon.stop(), Some(0));
     clean_log(folder.path());
     for verb in ["scan", "simulate"] {
@@ -132,9 +132,9 @@ fn missing_folder_sync_is_a_warning() {
             _ => command.arg("-o").arg(&out),
         };
         let output = command.output().expect("it starts");
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(0), "{verb}: {said}");
-        assert!(said.contains("cannot sync folders"), "{verb}: {said}");
+        let printed = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(0), "{verb}: {printed}");
+        assert!(printed.contains("cannot sync folders"), "{verb}: {printed}");
         let log = if verb == "scan" { out.join("scan.jsonl") } else { out };
         let verified = run(&["log", "verify", log.to_str().expect("plain path")]);
         assert_eq!(verified.status.code(), Some(0), "{verb}");

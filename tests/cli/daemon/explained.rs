@@ -1,4 +1,4 @@
-//! What would explain a scan's readings better than what the daemon believes.
+//! Changes of pose, air or sensor that explain a scan better than the assumed ones.
 
 use serde_json::{Value, json};
 use sonard::mock::Pace;
@@ -6,7 +6,7 @@ use sonard::mock::Pace;
 use super::{Daemon, clean_log, logs, rig::Rig};
 use crate::common::{run, wait_until};
 
-/// Takes a scan from where the daemon is told to be.
+/// Takes a scan at the pose in the configuration.
 fn scan(daemon: &Daemon, pose: [f64; 3], number: u64) {
     let [x_m, y_m, heading_deg] = pose;
     let pose = json!({ "x_m": x_m, "y_m": y_m, "heading_deg": heading_deg });
@@ -15,11 +15,12 @@ fn scan(daemon: &Daemon, pose: [f64; 3], number: u64) {
     daemon.wait_for_scans(number);
 }
 
-/// What is said of the last scan, once something is.
+/// Returns the explanation of the last scan, once there is one.
 fn explanations(daemon: &Daemon) -> Vec<Value> {
-    let told = || daemon.health()["fit"]["explanations"].as_array().cloned().unwrap_or_default();
-    wait_until("an explanation", || !told().is_empty());
-    told()
+    let reported =
+        || daemon.health()["fit"]["explanations"].as_array().cloned().unwrap_or_default();
+    wait_until("an explanation", || !reported().is_empty());
+    reported()
 }
 
 fn events(folder: &std::path::Path) -> Vec<String> {
@@ -53,8 +54,8 @@ fn wrong_pose_is_reported_once() {
         assert!((value + 0.02).abs() < 0.004, "{name}: {found:?}");
     }
     let socket = folder.path().join("s").display().to_string();
-    let said = String::from_utf8(run(&["status", "--socket", &socket]).stdout).expect("text");
-    assert!(said.contains("fit      better with "), "{said}");
+    let printed = String::from_utf8(run(&["status", "--socket", &socket]).stdout).expect("text");
+    assert!(printed.contains("fit      better with "), "{printed}");
     assert_eq!(daemon.get("/v1/pose").json()["x_m"].as_f64(), Some(x_m + 0.02));
     scan(&daemon, [x_m, y_m, heading_deg], 2);
     let log = logs(folder.path()).remove(0);

@@ -1,4 +1,4 @@
-//! What befalls the port and the disk: each told once, waited for, recovered from.
+//! Faults of port and disk: each is logged once and recovered from.
 
 use std::time::Duration;
 
@@ -30,9 +30,9 @@ fn unplugged_ranger() {
     rig.unplug();
     daemon.wait_for("absent");
     // The absence is reported once.
-    let said = daemon.said().lines().count();
+    let printed = daemon.messages().lines().count();
     std::thread::sleep(Duration::from_secs(3));
-    assert_eq!(daemon.said().lines().count(), said, "{}", daemon.said());
+    assert_eq!(daemon.messages().lines().count(), printed, "{}", daemon.messages());
     let status = daemon.status();
     assert!(status["link"]["retry_in_s"].as_f64().is_some_and(|wait_s| wait_s <= 0.4));
     assert!(
@@ -50,7 +50,7 @@ fn unplugged_ranger() {
     let count = |what: &str| events.iter().filter(|event| event.contains(what)).count();
     assert_eq!(count("ready again"), 2, "{events:?}");
     assert_eq!(count("absent: "), 2, "{events:?}");
-    // The scan that broke off says which beams it lost.
+    // The interrupted scan lists its missing beams.
     let given_up = log.of_type("scan_end").next().expect("an end");
     assert_eq!(
         given_up["missing"].as_u64().map(|m| m + given_up["beams"].as_u64().unwrap_or(0)),

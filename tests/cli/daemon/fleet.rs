@@ -1,4 +1,4 @@
-//! Many daemons at a time: status, watch, and one daemon that asks the others.
+//! Status and watch of many daemons, and a daemon that polls others.
 
 use std::{
     fs,
@@ -16,10 +16,10 @@ use std::{
 use serde_json::Value;
 use sonard_test_support::fleet::{Fleet, SCANNING, until_it_listens};
 
-use super::{Daemon, ask, write_token};
+use super::{Daemon, request, write_token};
 use crate::common::{run, sonard, stderr, wait_until};
 
-fn said(output: &Output) -> String {
+fn printed(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
@@ -36,19 +36,19 @@ fn status_of_three_robots() {
     assert!(picture["points_m"].as_array().expect("points").len() > 50, "{picture}");
     assert!(picture["walls_m"].as_array().expect("walls").len() >= 4, "{picture}");
     let output = fleet.status();
-    assert_eq!(output.status.code(), Some(0), "{}{}", said(&output), stderr(&output));
+    assert_eq!(output.status.code(), Some(0), "{}{}", printed(&output), stderr(&output));
 
     fleet.rig.unplug();
     wait_until("the unplugged one", || fleet.states() == ["unhealthy", "healthy", "healthy"]);
     let output = fleet.status();
-    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert_eq!(output.status.code(), Some(1), "{}", printed(&output));
     assert!(fleet.reports()[0]["problems"][0].as_str().expect("why").contains("the link is"));
 
     fleet.robots[1].take().expect("it runs").kill();
     wait_until("the killed one", || fleet.states() == ["unhealthy", "no_response", "healthy"]);
     let output = fleet.status();
-    assert_eq!(output.status.code(), Some(3), "{}", said(&output));
-    let table = said(&output);
+    assert_eq!(output.status.code(), Some(3), "{}", printed(&output));
+    let table = printed(&output);
     let row =
         |name: &str| table.lines().find(|line| line.contains(name)).expect("a row").to_owned();
     assert!(row("mango").contains("OFFLINE") && row("lime").contains('%'), "{table}");
@@ -94,7 +94,7 @@ fn without_a_fleet() {
     }
 }
 
-/// Answers each request as somebody who is no proper daemon; how many bytes of its answers were taken.
+/// Answers each request as a faulty daemon; returns the number of bytes that were read of its answers.
 fn serve(
     answer: impl Fn(TcpStream, &AtomicU64) + Send + Sync + 'static,
 ) -> (String, Arc<AtomicU64>) {
@@ -152,12 +152,12 @@ fn unreachable_and_foreign_daemons() {
     let (endless, taken) = serve(pour);
     let (liar, _) = serve(move |stream, _| answer_with(&stream, "application/json", &lie));
     let (babble, _) = serve(|mut stream, _| drop(stream.write_all(b"SSH-2.0-x\r\n")));
-    let nobody = {
+    let absent = {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         listener.local_addr().expect("its address").to_string()
     };
     let kiwi = robot.address();
-    let others = [&silent, &page, &endless, &liar, &babble, &nobody];
+    let others = [&silent, &page, &endless, &liar, &babble, &absent];
     let daemons: Vec<String> = others.iter().map(|one| (*one).clone()).collect();
     let daemons = [vec![format!("mango={kiwi}")], daemons].concat();
     let mut arguments = vec!["status"];
@@ -166,10 +166,10 @@ fn unreachable_and_foreign_daemons() {
     }
     let output = run(&[&arguments[..], &["--json"]].concat());
     assert_eq!(output.status.code(), Some(3));
-    let said = said(&output);
-    assert!(!said.contains('\u{1b}'), "{said:?}");
+    let printed = printed(&output);
+    assert!(!printed.contains('\u{1b}'), "{printed:?}");
     let rows: Vec<Value> =
-        said.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+        printed.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
     let states: Vec<&str> = rows.iter().map(|row| row["state"].as_str().expect("text")).collect();
     assert_eq!(
         states,
@@ -182,10 +182,10 @@ fn unreachable_and_foreign_daemons() {
             "invalid_response",
             "no_response"
         ],
-        "{said}"
+        "{printed}"
     );
     assert_eq!(rows[0]["problems"][0], "kiwi responds in place of mango");
-    assert!(rows[3]["problems"][0].as_str().expect("why").contains("longer than"), "{said}");
+    assert!(rows[3]["problems"][0].as_str().expect("why").contains("longer than"), "{printed}");
     // What the system's buffers hold, and no more, was taken of what has no end: two questions.
     let taken = taken.load(Ordering::Relaxed);
     assert!(taken < 24 << 20, "{taken} bytes");
@@ -240,7 +240,7 @@ fn api_hides_tokens() {
     ];
     let settings: Vec<&str> = settings.iter().flat_map(|one| ["--set", one.as_str()]).collect();
     let asking = Daemon::start_mock(folder.path(), &settings);
-    let shown = tokens.recv_timeout(Duration::from_secs(10)).expect("it asks");
+    let shown = tokens.recv_timeout(Duration::from_secs(10)).expect("a request");
     assert!(shown.ends_with(TOKEN), "{shown}");
     until_it_listens(&asking);
     wait_until("the refusal", || {
@@ -248,7 +248,7 @@ fn api_hides_tokens() {
     });
     let body = String::from_utf8(asking.get("/v1/fleet").body).expect("text");
     assert!(!body.contains(TOKEN) && !body.contains("token_file"), "{body}");
-    assert!(!asking.said().contains(TOKEN), "{}", asking.said());
+    assert!(!asking.messages().contains(TOKEN), "{}", asking.messages());
     for (host, origin, status) in [
         ("localhost", None, 200),
         ("evil.example", None, 403),
@@ -257,7 +257,7 @@ fn api_hides_tokens() {
         for path in ["/v1/fleet", "/fleet"] {
             let headers: Vec<_> =
                 [("Host", host)].into_iter().chain(origin.map(|one| ("Origin", one))).collect();
-            let reply = ask(asking.connect_tcp(), "GET", path, &headers, "");
+            let reply = send_request(asking.connect_tcp(), "GET", path, &headers, "");
             assert_eq!(reply.status, status, "{path} {host} {origin:?}");
         }
     }
@@ -283,13 +283,13 @@ fn watch_of_all_robots() {
             .expect("the program starts");
     let mut lines = BufReader::new(watching.stdout.take().expect("piped")).lines();
     let mut until_both = || {
-        let mut heard = [false; 2];
-        while heard != [true; 2] {
+        let mut received = [false; 2];
+        while received != [true; 2] {
             let line = lines.next().expect("it goes on").expect("text");
             let line: Value = serde_json::from_str(&line).expect("JSON");
             let is_reading = line["record"]["type"] == "ping";
             let number = ["kiwi", "mango"].iter().position(|name| line["robot"] == *name);
-            heard[number.expect("a robot")] |= is_reading;
+            received[number.expect("a robot")] |= is_reading;
         }
     };
     until_both();

@@ -1,4 +1,4 @@
-//! Viewers that speak Foxglove's protocol: what they are told, who may come, and what they can cost.
+//! Foxglove's protocol: messages to viewers, access, and the cost of viewers.
 
 mod access;
 mod cost;
@@ -11,7 +11,7 @@ use std::time::Duration;
 use serde_json::{Value, json};
 
 use super::{Daemon, clean_log};
-use viewer::{Told, Viewer, range_of};
+use viewer::{Received, Viewer, range_of};
 
 /// A daemon with viewers, of a small plan.
 fn start(folder: &std::path::Path, further: &[&str]) -> Daemon {
@@ -51,25 +51,25 @@ fn readings_match_the_log() {
         assert_eq!((kept.of("/tf_static").count(), kept.of("/sonar/scene").count()), (1, 1));
     }
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
-    let told = viewers.each_mut().map(|viewer| viewer.until("/sonar/paths"));
+    let reported = viewers.each_mut().map(|viewer| viewer.until("/sonar/paths"));
     daemon.wait_for_scans(2);
     daemon.wait_for("ready");
     let log = clean_log(folder.path());
     let second = log.of_type("scan_start").nth(1).expect("two scans")["scan"].clone();
     let pings: Vec<&Value> = log.of_type("ping").filter(|ping| ping["scan"] == second).collect();
-    for told in &told {
-        assert_ranges(told, &pings, "/sonar/range", |ping| ping);
-        assert_ranges(told, &pings, "/sonar/predicted/range", |ping| &ping["sim"]);
-        let residuals = told
+    for reported in &reported {
+        assert_ranges(reported, &pings, "/sonar/range", |ping| ping);
+        assert_ranges(reported, &pings, "/sonar/predicted/range", |ping| &ping["sim"]);
+        let residuals = reported
             .of("/sonar/residual")
             .map(|(_, bytes)| f64::from_le_bytes(bytes[4..12].try_into().expect("a number")));
         let expected = pings.iter().filter_map(|ping| ping["residual_m"].as_f64());
         assert!(residuals.eq(expected));
         for topic in ["/sonar/scan", "/sonar/points", "/sonar/predicted/points"] {
-            assert_eq!(told.of(topic).count(), 1, "{topic}");
+            assert_eq!(reported.of(topic).count(), 1, "{topic}");
         }
         // At each firing, and when its window ended.
-        assert_eq!(told.of("/tf").count(), 2 * pings.len());
+        assert_eq!(reported.of("/tf").count(), 2 * pings.len());
     }
     let [mut one, other] = viewers;
     drop(other);
@@ -78,19 +78,19 @@ fn readings_match_the_log() {
     assert_eq!(daemon.stop(), Some(0));
 }
 
-/// Stamps and ranges of a topic are those of the readings that have one to tell.
+/// Checks that a topic has the stamps and ranges of the readings with a range.
 fn assert_ranges<'a>(
-    told: &Told,
+    reported: &Received,
     pings: &[&'a Value],
     topic: &str,
-    heard: impl Fn(&'a Value) -> &'a Value,
+    received: impl Fn(&'a Value) -> &'a Value,
 ) {
     let expected: Vec<(i128, f32)> = pings
         .iter()
         .filter_map(|ping| {
             let fired: jiff::Timestamp = ping["time"].as_str()?.parse().expect("a time");
-            let range = match heard(ping)["status"].as_str()? {
-                "echo" => heard(ping)["range_m"].as_f64()? as f32,
+            let range = match received(ping)["status"].as_str()? {
+                "echo" => received(ping)["range_m"].as_f64()? as f32,
                 "no_echo" => f32::INFINITY,
                 "min_range" => f32::NEG_INFINITY,
                 _ => return None,
@@ -99,7 +99,7 @@ fn assert_ranges<'a>(
         })
         .collect();
     assert!(expected.len() > 30, "{topic}: {}", expected.len());
-    let ranges: Vec<(i128, f32)> = told.of(topic).map(|(_, bytes)| range_of(bytes)).collect();
+    let ranges: Vec<(i128, f32)> = reported.of(topic).map(|(_, bytes)| range_of(bytes)).collect();
     assert_eq!(ranges, expected, "{topic}");
 }
 
@@ -118,19 +118,19 @@ fn late_viewer_gets_the_last_scan() {
     let mut late = Viewer::new(daemon.connect().expect("it listens"), "foxglove.sdk.v1");
     late.wait_for_channels();
     late.subscribe_to_all();
-    let told = late.for_a_while(Duration::from_secs(1));
+    let reported = late.for_a_while(Duration::from_secs(1));
     for topic in
         ["/tf", "/tf_static", "/sonar/scene", "/sonar/scan", "/sonar/points", "/sonar/paths"]
     {
-        assert_eq!(told.of(topic).count(), 1, "{topic}");
+        assert_eq!(reported.of(topic).count(), 1, "{topic}");
     }
-    assert_eq!(told.of("/sonar/range").count(), 0, "readings of before are over");
+    assert_eq!(reported.of("/sonar/range").count(), 0, "readings of before are over");
     // Another scan goes on from there.
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
-    let told = late.until("/sonar/paths");
-    assert!(told.of("/sonar/range").count() > 30);
+    let reported = late.until("/sonar/paths");
+    assert!(reported.of("/sonar/range").count() > 30);
     assert_eq!(daemon.stop(), Some(0));
-    assert!(matches!(late.next(), None | Some(viewer::Came::End(1001))), "it is told of the end");
+    assert!(matches!(late.next(), None | Some(viewer::Came::End(1001))), "a close frame");
 }
 
 #[test]
@@ -143,8 +143,8 @@ fn topic_per_ranger() {
     viewer.wait_for_channels();
     viewer.subscribe_to_all();
     drop(viewer.until("/sonar/points"));
-    let told = viewer.until("/sonar/points");
-    let topics: Vec<&str> = told.topics().collect();
+    let reported = viewer.until("/sonar/points");
+    let topics: Vec<&str> = reported.topics().collect();
     let of_rangers = topics.iter().filter(|topic| topic.ends_with("/range")).count();
     assert_eq!(of_rangers, 8, "{topics:?}");
     assert!(!topics.contains(&"/sonar/scan") && !topics.contains(&"/sonar/range"), "{topics:?}");

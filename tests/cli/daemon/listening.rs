@@ -1,4 +1,4 @@
-//! Where a daemon listens: sockets that are removed or replaced, addresses that come later, and starts that are rejected.
+//! Listening addresses: sockets that are removed or replaced, addresses that come later, and starts that are rejected.
 
 use std::{
     fs,
@@ -12,12 +12,12 @@ use serde_json::{Value, json};
 
 use rustix::process::Signal;
 
-use super::{Daemon, ask, write_token};
+use super::{Daemon, request, write_token};
 use crate::common::{run, stderr, wait_until};
 
 fn health_by_tcp(address: &str) -> Value {
     let stream = TcpStream::connect(address).expect("it listens there");
-    ask(stream, "GET", "/v1/health", &[("Host", "localhost")], "").json()
+    send_request(stream, "GET", "/v1/health", &[("Host", "localhost")], "").json()
 }
 
 fn is_unwell(health: &Value, words: &str) -> bool {
@@ -25,9 +25,9 @@ fn is_unwell(health: &Value, words: &str) -> bool {
     reasons.iter().any(|reason| reason.as_str().is_some_and(|text| text.contains(words)))
 }
 
-/// How often the daemon has logged these words.
+/// Returns how often the daemon has logged a text.
 fn count(daemon: &Daemon, words: &str) -> usize {
-    daemon.said().matches(words).count()
+    daemon.messages().matches(words).count()
 }
 
 #[test]
@@ -56,10 +56,10 @@ fn foreign_socket_is_kept() {
     let theirs = UnixListener::bind(&socket).expect("a free path");
     let id = fs::metadata(&socket).expect("it is there").ino();
     wait_until("the reason", || is_unwell(&health_by_tcp(&address), "another process"));
-    // Nobody listens there any more, and it is not this daemon's for that.
+    // A stale socket without a listener still does not belong to this daemon.
     drop(theirs);
     std::thread::sleep(Duration::from_secs(5));
-    assert_eq!(count(&daemon, "another process"), 1, "{}", daemon.said());
+    assert_eq!(count(&daemon, "another process"), 1, "{}", daemon.messages());
     assert_eq!(fs::metadata(&socket).expect("it is there").ino(), id);
     fs::remove_file(&socket).expect("it is there");
     wait_until("the socket", || daemon.connect().is_ok());
@@ -82,11 +82,11 @@ fn busy_tcp_port() {
     daemon.wait_for_scans(1);
     assert!(is_unwell(&daemon.health(), &format!("server.listen {address}")));
     std::thread::sleep(Duration::from_secs(5));
-    assert_eq!(count(&daemon, "cannot be bound yet"), 1, "{}", daemon.said());
+    assert_eq!(count(&daemon, "cannot be bound yet"), 1, "{}", daemon.messages());
     drop(taken);
     wait_until("the address", || TcpStream::connect(&address).is_ok());
     wait_until("health", || health_by_tcp(&address)["healthy"] == true);
-    assert_eq!(count(&daemon, "listening on http://"), 1, "{}", daemon.said());
+    assert_eq!(count(&daemon, "listening on http://"), 1, "{}", daemon.messages());
     assert_eq!(daemon.stop(), Some(0));
 }
 
@@ -133,9 +133,9 @@ fn impossible_addresses() {
             let options = options(folder.path(), &[&["--set", &setting], check].concat());
             let options: Vec<&str> = options.iter().map(String::as_str).collect();
             let output = run(&options);
-            let said = stderr(&output);
-            assert_eq!(output.status.code(), Some(2), "{setting} {check:?}: {said}");
-            assert!(dense(&said).contains(&dense(words)), "{setting} {check:?}: {said}");
+            let printed = stderr(&output);
+            assert_eq!(output.status.code(), Some(2), "{setting} {check:?}: {printed}");
+            assert!(dense(&printed).contains(&dense(words)), "{setting} {check:?}: {printed}");
         }
         let after = fs::read_dir(folder.path()).expect("a folder").count();
         assert_eq!(after, before, "{setting}: nothing is left");

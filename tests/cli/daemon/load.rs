@@ -37,7 +37,7 @@ fn figures_of_cpu_and_memory() {
     daemon.wait_for("ready");
     let idle = core_share(&daemon, Duration::from_secs(5));
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":2}"#).status, 202);
-    // Before the first beam of a new place the model is asked, once.
+    // Before the first beam at a new position the model computes its predictions once.
     wait_until("a beam", || daemon.status()["scan"]["done"].as_u64() >= Some(1));
     let predicted_s = cpu_s(daemon.id());
     let scanning = core_share(&daemon, Duration::from_secs(10));
@@ -117,7 +117,7 @@ fn dead_subscribers() {
     assert_eq!(daemon.stop(), Some(0));
 }
 
-/// How late readings came, milliseconds after the end of their listening window.
+/// Delays of readings after the end of their receive window, milliseconds.
 fn lateness_ms(stream: impl std::io::Read, until: Instant) -> Vec<f64> {
     let mut late_ms = Vec::new();
     for line in BufReader::new(stream).lines().map_while(Result::ok) {
@@ -138,7 +138,7 @@ fn lateness_ms(stream: impl std::io::Read, until: Instant) -> Vec<f64> {
 /// Beams of the largest scans here: 400 stops, 160 firings at each.
 const MANY_BEAMS: u64 = 64_000;
 
-/// Reads a stream by little and little, as over a poor line, until told to stop.
+/// Reads a stream slowly, as over a poor line, until the flag is set.
 fn read_slowly(mut stream: impl std::io::Read, over: &AtomicBool) {
     let mut piece = [0; 4096];
     while !over.load(Ordering::Relaxed) && stream.read(&mut piece).is_ok_and(|count| count > 0) {
@@ -196,7 +196,7 @@ fn large_scans_to_slow_clients() {
     println!("idle {idle_kb} kB; {taken_kb} kB with 100 slow subscribers of {MANY_BEAMS} beams");
     assert_eq!(daemon.stop(), Some(0));
 
-    // Another one measures in real time while they ask for that scan.
+    // A second daemon measures in real time while clients request that scan.
     let mut rig = Rig::new(folder.path(), Pace::RealTime);
     rig.plug("", 1);
     let further = [
@@ -242,7 +242,7 @@ fn large_scans_to_slow_clients() {
     let late = late_ms[late_ms.len() * 95 / 100];
     let asked_kb = peak_kb(daemon.id());
     println!(
-        "idle {idle_kb} kB; {asked_kb} kB with the scan asked for at once and ten times slowly; {} \
+        "idle {idle_kb} kB; {asked_kb} kB with the scan requested at once and ten times slowly; {} \
          readings, {late:.1} ms late at 95 %",
         late_ms.len()
     );

@@ -1,4 +1,4 @@
-//! Where scans were taken, asked of a daemon that has them in its logs.
+//! Poses of logged scans, located by a daemon.
 
 use std::{
     fs,
@@ -19,7 +19,7 @@ const ROOM: &str = r#"{"name": "long room", "materials": {"plaster": {"reflectan
     {"id": "stub", "from": [2.9, 1], "to": [2.9, 0.6], "material": "plaster"}]}"#;
 const WAY: &str = "2.2,0.4,5\n3.4,0.35,30\n4.4,0.6,80\n";
 
-/// One so large and full of pillars that it takes minutes to look it over.
+/// Scene so large and full of pillars that a search takes minutes.
 fn hall() -> String {
     let pillar = |at: u32| {
         let [x_m, y_m] = [at % 8, at / 8].map(|place| 1.5 + 2.2 * f64::from(place));
@@ -49,7 +49,7 @@ fn simulated(folder: &Path, day: u32, scene: &str, way: &str, further: &[&str]) 
     log
 }
 
-/// What `sonard locate --json` says of a log.
+/// Returns the output of `sonard locate --json` for a log.
 fn located(log: &Path, further: &[&str]) -> Vec<Value> {
     let locate = ["locate", log.to_str().expect("a plain path"), "--json"];
     let output = run(&[&locate[..], further].concat());
@@ -58,7 +58,7 @@ fn located(log: &Path, further: &[&str]) -> Vec<Value> {
     text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
 }
 
-/// Whether the poses of a location are those that the program listed of its scan.
+/// Returns `true` if the poses of a location are those that the program lists for its scan.
 fn assert_same(location: &Location, listed: &[Value]) {
     assert_eq!(location.unavailable_reason, None);
     let scan = location.scan.to_string();
@@ -104,16 +104,16 @@ fn locates_as_the_command_does() {
     let listed = located(&log, &["--course"]);
     way.iter().for_each(|location| assert_same(location, &listed));
     assert!(way[2].poses[0].probability > 0.99, "{:?}", way[2]);
-    // Where all may have been carried, the way there says nothing.
+    // If the robot may have been carried, the course does not constrain the pose.
     let carried = course(&format!("?carried=1&to={}", scans[1]));
     assert_eq!(carried.len(), 2);
     assert_same(&carried[1], &located(&log, &["--course", "--kidnap-probability", "1"]));
-    let nobody = "00000000-0000-4000-8000-000000000000";
+    let absent = "00000000-0000-4000-8000-000000000000";
     for (path, status) in [
-        (format!("{nobody}/location"), 404),
-        (format!("{nobody}/course"), 404),
+        (format!("{absent}/location"), 404),
+        (format!("{absent}/course"), 404),
         ("latest/course".to_owned(), 404),
-        (format!("{}/course?to={nobody}", scans[0]), 404),
+        (format!("{}/course?to={absent}", scans[0]), 404),
         (format!("{}/course?to={}", scans[1], scans[0]), 404),
         (format!("{}/course?carried=1.5", scans[0]), 422),
         (format!("{}/course?drift_m_per_m=-1", scans[0]), 422),

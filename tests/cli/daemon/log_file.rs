@@ -44,7 +44,7 @@ fn recover(daemon: Daemon, incident: &str) -> Log {
     Log::parse(&text)
 }
 
-/// Whether a gap says what happened, in a file that begins with a session.
+/// Returns `true` if a gap event states the reason, in a file that begins with a session.
 fn assert_gap(log: &Log, detail: &str) {
     let events = log.events();
     assert!(

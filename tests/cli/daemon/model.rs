@@ -1,4 +1,4 @@
-//! What the API makes of scans: echo traces, previews, and maps, lines and features.
+//! Results derived from scans by the API: echo traces, previews, maps, lines and features.
 
 use std::fs;
 
@@ -31,8 +31,8 @@ fn preview_matches_the_prediction() {
     daemon.wait_for("ready");
     let before = daemon.status();
     let there = json!({"x_m": 0.5, "y_m": 0.4, "heading_deg": 30.0});
-    let asked = json!({"pose": there, "air": {"temperature_c": 31.0}}).to_string();
-    let reply = daemon.send("POST", "/v1/preview", &asked);
+    let requested = json!({"pose": there, "air": {"temperature_c": 31.0}}).to_string();
+    let reply = daemon.send("POST", "/v1/preview", &requested);
     assert_eq!(reply.status, 200, "{}", reply.json());
     let expected: WholeScan = serde_json::from_value(reply.json()).expect("a scan");
     assert_eq!(serde_json::to_value(&expected).expect("JSON"), reply.json());
@@ -45,8 +45,8 @@ fn preview_matches_the_prediction() {
     assert_eq!(daemon.send("PUT", "/v1/air", r#"{"temperature_c":31}"#).status, 202);
     let taken = scan_once(&daemon);
     for (expected, reading) in expected.pings.iter().zip(taken["pings"].as_array().expect("them")) {
-        let said = reading["sim"]["range_m"].as_f64();
-        assert_eq!(expected.ping.range_m, said, "{reading}");
+        let printed = reading["sim"]["range_m"].as_f64();
+        assert_eq!(expected.ping.range_m, printed, "{reading}");
         let verdict = serde_json::to_value(expected.annotations.verdict).expect("JSON");
         assert!(verdict.is_string() && verdict != "unexplained", "{verdict}");
     }
@@ -72,8 +72,8 @@ fn rejected_previews() {
     ] {
         let reply = daemon.send("POST", "/v1/preview", body);
         assert_eq!(reply.status, status, "{body}: {}", reply.json());
-        let said = reply.json()["error"].as_str().expect("words").to_owned();
-        assert!(said.contains(words), "{body}: {said}");
+        let message = reply.json()["error"].as_str().expect("words").to_owned();
+        assert!(message.contains(words), "{body}: {message}");
     }
 }
 
@@ -94,7 +94,7 @@ fn echo_trace_of_a_beam() {
     let blanking_us = trace["blanking_us"].as_f64().expect("a time");
     let over = (0..envelope.len())
         .find(|&i| i as f64 * step_us > blanking_us && envelope[i] > threshold[i])
-        .expect("it is heard");
+        .expect("a crossing of the threshold");
     let there_m = over as f64 * step_us * trace["m_per_us"].as_f64().expect("a speed");
     let read_m = scan["pings"][75]["sim"]["range_m"].as_f64().expect("a range");
     assert!((there_m - read_m).abs() < 0.02, "{there_m} and {read_m}");

@@ -1,4 +1,4 @@
-//! The dashboard and the alerts that are shipped ask for what the daemon tells.
+//! Metrics of the shipped dashboard and alerts.
 
 use std::collections::BTreeSet;
 
@@ -11,11 +11,11 @@ const FILES: [(&str, &str); 3] = [
     ("sonard-alerts.test.yml", include_str!("../../../config/monitoring/sonard-alerts.test.yml")),
 ];
 
-/// Told once the device's clock has been watched for longer than this test takes; the figures of the clock are told
+/// Metrics of the device's clock, which need a longer observation than this test; they are published
 /// together.
 const LATER: [&str; 2] = ["sonard_clock_drift_ppm", "sonard_clock_sigma_microseconds"];
 
-/// What begins like one of the daemon's figures.
+/// Returns the words with the prefix of the daemon's metrics.
 fn named(text: &str) -> BTreeSet<&str> {
     let is_part = |c: char| c.is_ascii_alphanumeric() || c == '_';
     let words = text.split(|c: char| !is_part(c));
@@ -33,7 +33,7 @@ fn dashboard_and_alert_metrics() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(
         folder.path(),
-        // With a clock of its own, whose figures are asked for, too.
+        // With a clock of its own, for the metrics of the clock.
         &[
             "--realtime",
             "--set",
@@ -49,12 +49,12 @@ fn dashboard_and_alert_metrics() {
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
     daemon.wait_for_scans(1);
     let figures = String::from_utf8(daemon.get("/metrics").body).expect("text");
-    let told = named(&figures);
+    let reported = named(&figures);
     for (file, text) in FILES {
-        let asked = named(text);
-        assert!(asked.len() > 4, "{file}");
-        for name in asked.iter().filter(|name| !LATER.contains(name)) {
-            assert!(told.contains(name), "{file} asks for {name}:\n{figures}");
+        let requested = named(text);
+        assert!(requested.len() > 4, "{file}");
+        for name in requested.iter().filter(|name| !LATER.contains(name)) {
+            assert!(reported.contains(name), "{file} needs {name}:\n{figures}");
         }
     }
     // A mock plays what the model predicts, with noise of millimetres.

@@ -1,4 +1,4 @@
-//! What an MQTT broker gets of a daemon's log, whatever happens to both, and what it can ask or cost.
+//! Publication of a daemon's log through an MQTT broker, under faults of both; commands and cost.
 
 mod broker;
 mod commands;
@@ -38,7 +38,7 @@ fn wait_for_trouble(daemon: &Daemon, words: &str) {
     wait_until(words, || mqtt(daemon)["error"].as_str().is_some_and(|error| error.contains(words)));
 }
 
-/// What of the records tells one from another: a scan's by scan and index.
+/// Returns the identity of a record: scan and index.
 fn name(record: &Value) -> String {
     match record["type"].as_str().expect("a type") {
         "ping" => format!("{} {}", record["scan"], record["index"]),
@@ -50,7 +50,7 @@ fn name(record: &Value) -> String {
 /// The records that were published, each once. One that came twice came alike.
 fn records(broker: &Broker) -> BTreeMap<String, Value> {
     let mut records = BTreeMap::new();
-    for published in &broker.heard().published {
+    for published in &broker.received().published {
         let kind = published.topic.strip_prefix("sonard/kiwi/").expect("its robot's");
         if matches!(kind, "online" | "status" | "answer") {
             continue;
@@ -98,18 +98,19 @@ fn records_and_presence() {
 
     assert_eq!(daemon.stop(), Some(0));
     let online = broker.of("sonard/kiwi/online");
-    let told: Vec<_> = online.iter().map(|one| (one.payload.as_slice(), one.is_retained)).collect();
-    assert_eq!(told, [(&b"true"[..], true), (b"false", true)]);
-    let heard = broker.heard();
-    let [hello] = heard.introductions.as_slice() else { panic!("{:?}", heard.introductions) };
+    let reported: Vec<_> =
+        online.iter().map(|one| (one.payload.as_slice(), one.is_retained)).collect();
+    assert_eq!(reported, [(&b"true"[..], true), (b"false", true)]);
+    let received = broker.received();
+    let [hello] = received.introductions.as_slice() else { panic!("{:?}", received.introductions) };
     let will = ("sonard/kiwi/online".to_owned(), b"false".to_vec(), true);
     assert_eq!((&hello.will, hello.id.as_str()), (&Some(will), "sonard-kiwi"));
     assert_eq!(
         (hello.user.as_deref(), hello.password.as_deref()),
         (Some("robot-1"), Some(&b"secret word"[..]))
     );
-    assert_eq!((hello.keep_alive_s, hello.is_clean, heard.goodbyes), (7, true, 1));
-    assert!(heard.subscriptions.is_empty(), "commands are off");
+    assert_eq!((hello.keep_alive_s, hello.is_clean, received.goodbyes), (7, true, 1));
+    assert!(received.subscriptions.is_empty(), "commands are off");
 }
 
 #[test]
@@ -135,7 +136,7 @@ fn backlog_after_outage_and_kill() {
     // Each connection brings some more.
     broker.become_(Manner::Short(40));
     let daemon = start(folder.path(), &broker, &small);
-    wait_until("some", || broker.heard().published.len() > 100);
+    wait_until("some", || broker.received().published.len() > 100);
     daemon.kill();
     broker.become_(Manner::Honest);
     let daemon = start(folder.path(), &broker, &small);
@@ -146,7 +147,7 @@ fn backlog_after_outage_and_kill() {
     assert_eq!(records(&broker), log());
     assert_eq!(daemon.stop(), Some(0));
     let published =
-        broker.heard().published.iter().filter(|one| one.topic.ends_with("/ping")).count();
+        broker.received().published.iter().filter(|one| one.topic.ends_with("/ping")).count();
     assert!(published > log().values().filter(|record| record["type"] == "ping").count());
 }
 
@@ -165,20 +166,20 @@ fn older_records_and_gaps() {
     assert_eq!(daemon.stop(), Some(0));
     let all = clean_log(folder.path()).records;
     assert_eq!(records(&broker).len(), all.len() - before);
-    // Somebody begins anew.
+    // The position file is removed: publication starts again.
     std::fs::remove_file(folder.path().join("log/mqtt-place.json")).expect("it is there");
     let daemon = start(folder.path(), &broker, &["--set", "mqtt.history=true"]);
     wait_until("all", || records(&broker).len() == clean_log(folder.path()).records.len());
     assert_eq!(daemon.stop(), Some(0));
-    // Somebody removes what was not sent.
+    // Unsent logs are removed.
     for log in super::logs(folder.path()) {
         std::fs::remove_file(log).expect("it is there");
     }
     let daemon = start(folder.path(), &broker, &[]);
     daemon.wait_for("ready");
-    wait_until("it is told", || {
-        let told = clean_log(folder.path()).events().join("\n");
-        told.contains("gap") && told.contains("which the broker has up to byte")
+    wait_until("the report", || {
+        let reported = clean_log(folder.path()).events().join("\n");
+        reported.contains("gap") && reported.contains("which the broker has up to byte")
     });
     assert_eq!(daemon.stop(), Some(0));
     assert!(records(&broker).values().any(|record| record["kind"] == "gap"));
@@ -193,7 +194,7 @@ fn wrong_settings() {
     let mock = ["run", "--mock", "--scene", "simple-room", "--pose", "fig9", "--log"];
     let log = folder.path().join("log");
     let socket = folder.path().join("s");
-    for (settings, told) in [
+    for (settings, reported) in [
         (&["mqtt.broker=broker"][..], "mqtt://HOST:PORT"),
         (&["mqtt.broker=mqtt://b", "mqtt.topic=a/#"], "mqtt.topic"),
         (
@@ -211,6 +212,6 @@ fn wrong_settings() {
         arguments.extend(settings.iter().flat_map(|setting| ["--set", setting]));
         let refused = run(&arguments);
         assert_eq!(refused.status.code(), Some(2), "{settings:?}");
-        assert!(stderr(&refused).contains(told), "{settings:?}: {}", stderr(&refused));
+        assert!(stderr(&refused).contains(reported), "{settings:?}: {}", stderr(&refused));
     }
 }

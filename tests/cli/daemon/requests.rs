@@ -1,5 +1,5 @@
-//! Scans that are asked for while the daemon does something else: by their own plan, by the command
-//! line; and what can be changed while it runs.
+//! Scans requested during other work, with their own plan or from the command
+//! line, and changes at run time.
 
 use std::{
     io::{BufRead as _, BufReader, Write as _},
@@ -39,9 +39,9 @@ fn scan_with_its_own_plan() {
         .output()
         .expect("it runs");
     assert_eq!(taken.status.code(), Some(0), "{}", stderr(&taken));
-    let told = stderr(&taken);
+    let reported = stderr(&taken);
     for part in ["takes 2 scans, ", "scan 2 of 2 started: 50 beams", "mock", "echoes agree"] {
-        assert!(told.contains(part), "{part}: {told}");
+        assert!(reported.contains(part), "{part}: {reported}");
     }
     let log = Log::read(&out.join("scan.jsonl"));
     let starts: Vec<_> = log.of_type("scan_start").collect();
@@ -62,18 +62,21 @@ fn scan_with_its_own_plan() {
     let before = daemon.health()["scans"]["completed"].as_u64();
     wait_until("its own scans again", || daemon.health()["scans"]["completed"].as_u64() > before);
 
-    // What can't be: another scene, a sensor of one's own, a pose in the wall, nobody there.
+    // Rejected: another scene, another sensor, a pose in a wall, a daemon that is not running.
     let corridor = scan(&daemon, &["--scene", "corridor", "--pose", "beside-wall"]).output();
     let corridor = corridor.expect("it runs");
-    let said = stderr(&corridor).split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(corridor.status.code() == Some(2) && said.contains("its scene simple-room"), "{said}");
+    let printed = stderr(&corridor).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        corridor.status.code() == Some(2) && printed.contains("its scene simple-room"),
+        "{printed}"
+    );
     let sensor = [&own[..], &["--sensor", "pioneer"]].concat();
     assert_eq!(scan(&daemon, &sensor).output().expect("it runs").status.code(), Some(2));
     let wrong = daemon.send("POST", "/v1/start", r#"{"pose":{"x_m":9,"y_m":9,"heading_deg":0}}"#);
     assert_eq!(wrong.status, 409);
     assert_eq!(daemon.stop(), Some(0));
-    let nobody = sonard(&["scan", "--daemon", "--socket", "/nowhere"]).args(own).output();
-    assert_eq!(nobody.expect("it runs").status.code(), Some(3));
+    let absent = sonard(&["scan", "--daemon", "--socket", "/nowhere"]).args(own).output();
+    assert_eq!(absent.expect("it runs").status.code(), Some(3));
 }
 
 #[test]
@@ -86,28 +89,28 @@ fn token_over_tcp() {
     let daemon = Daemon::start_mock(folder.path(), &[&SHORT[..], &tcp].concat());
     daemon.wait_for("ready");
     let address = daemon.address();
-    let ask = |arguments: &[&str]| {
+    let request = |arguments: &[&str]| {
         let command = [arguments, &["--address", &address]].concat();
         let output = sonard(&command).env_remove("SONARD_SERVER_TOKEN_FILE").output();
         let output = output.expect("it runs");
-        let said = stderr(&output).split_whitespace().collect::<Vec<_>>().join(" ");
-        (output.status.code(), said, String::from_utf8_lossy(&output.stdout).into_owned())
+        let printed = stderr(&output).split_whitespace().collect::<Vec<_>>().join(" ");
+        (output.status.code(), printed, String::from_utf8_lossy(&output.stdout).into_owned())
     };
-    let (code, said, status) = ask(&["status"]);
-    assert!(code == Some(0) && status.contains("MOCK-00001"), "{said}");
+    let (code, printed, status) = request(&["status"]);
+    assert!(code == Some(0) && status.contains("MOCK-00001"), "{printed}");
     let scan = ["scan", "--daemon", "--scene", "simple-room", "--pose", "fig7", "--to-deg", "36"];
-    let (code, said, _) = ask(&scan);
-    assert!(code == Some(3) && said.contains("token is missing or wrong"), "{said}");
-    let (code, said, log) = ask(&[&scan[..], &["--token-file", &token]].concat());
-    assert_eq!(code, Some(0), "{said}");
+    let (code, printed, _) = request(&scan);
+    assert!(code == Some(3) && printed.contains("token is missing or wrong"), "{printed}");
+    let (code, printed, log) = request(&[&scan[..], &["--token-file", &token]].concat());
+    assert_eq!(code, Some(0), "{printed}");
     Log::parse(&log).assert_each_beam_once(40);
     for (wrong, part) in [
         (&["--address", "localhost:1", "--token-file", "/nowhere"][..], "cannot read the token"),
         (&["--address", "https://robot.local/"], "plain HTTP"),
     ] {
         let output = sonard(&["status"]).args(wrong).output().expect("it runs");
-        let said = stderr(&output).split_whitespace().collect::<Vec<_>>().join(" ");
-        assert!(output.status.code() == Some(2) && said.contains(part), "{said}");
+        let printed = stderr(&output).split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(output.status.code() == Some(2) && printed.contains(part), "{printed}");
     }
     assert_eq!(daemon.stop(), Some(0));
 }

@@ -1,8 +1,8 @@
-//! Whether a value is what a schema says: as much of JSON Schema as the API's document uses.
+//! Validation of values by the part of JSON Schema that the API's document uses.
 
 use serde_json::Value;
 
-/// What does not fit, with its place; nothing if all does. `document` resolves references.
+/// Returns each mismatch with its place. `document` resolves references.
 pub(crate) fn misfits(schema: &Value, document: &Value, value: &Value) -> Vec<String> {
     let mut found = Vec::new();
     check(schema, document, value, "", &mut found);

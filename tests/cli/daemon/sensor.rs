@@ -30,18 +30,18 @@ fn preview_apply_and_restore() {
         presets.as_array().expect("presets").iter().map(|one| &one["name"]).collect();
     assert!(names.len() >= 7 && names.contains(&&json!("hc-sr04")), "{names:?}");
 
-    // A deaf one hears less, before anything is changed.
-    let deaf = json!({"threshold": 0.9});
+    // With a higher threshold the preview has fewer echoes; the sensor is unchanged.
+    let insensitive = json!({"threshold": 0.9});
     let preview = |sensor: &Value| {
         let reply = daemon.send("POST", "/v1/preview", &json!({"sensor": sensor}).to_string());
         assert_eq!(reply.status, 200, "{}", reply.json());
         reply.json()["pings"].clone()
     };
-    let (now, then) = (echoes(&preview(&json!({}))), echoes(&preview(&deaf)));
+    let (now, then) = (echoes(&preview(&json!({}))), echoes(&preview(&insensitive)));
     assert!(then < now, "{then} of {now}");
     assert_eq!(daemon.get("/v1/sensor").json(), own);
 
-    // A list is one where the document says so, and nowhere else.
+    // Lists are accepted only where the schema has lists.
     let steps = json!([{"until_us": 9000, "gain_db": -3}, {"until_us": null, "gain_db": 0}]);
     preview(&json!({"gain": {"kind": "steps", "steps": steps}}));
     for wrong in
@@ -53,7 +53,7 @@ fn preview_apply_and_restore() {
     // While a scan is under way it waits for the next one.
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
     daemon.wait_until("a scan", || daemon.status()["scan"]["done"].as_u64() > Some(2));
-    assert_eq!(daemon.send("PUT", "/v1/sensor", &deaf.to_string()).status, 202);
+    assert_eq!(daemon.send("PUT", "/v1/sensor", &insensitive.to_string()).status, 202);
     let status = daemon.status();
     assert_eq!(status["sensor"]["threshold"], own["threshold"]);
     assert_eq!(status["pending"]["sensor"]["threshold"], 0.9);
@@ -98,12 +98,12 @@ fn rejected_by_device_or_file() {
     ] {
         let reply = daemon.send("PUT", "/v1/sensor", body);
         assert_eq!(reply.status, status, "{body}: {}", reply.json());
-        let said = reply.json()["error"].as_str().expect("words").to_owned();
-        assert!(said.contains(words), "{body}: {said}");
+        let message = reply.json()["error"].as_str().expect("words").to_owned();
+        assert!(message.contains(words), "{body}: {message}");
     }
     assert_eq!(daemon.status()["pending"]["sensor"], Value::Null);
     assert_eq!(daemon.send("PUT", "/v1/sensor", r#"{"blanking_us":900}"#).status, 202);
-    // A configuration that is read again leaves it, unless it says something else of the sensor.
+    // A reloaded configuration keeps the sensor unless it changes a key of the sensor.
     for (text, blanking_us) in
         [("[model]\nthreshold = 0.04\n", 900.0), ("[model]\nsensor = \"polaroid-chirp\"\n", 1600.0)]
     {
@@ -160,8 +160,8 @@ fn sensor_of_an_array() {
     let pose = daemon.get("/v1/pose").json();
     let ahead = json!({"x_m": pose["x_m"], "y_m": pose["y_m"],
                        "heading_deg": pose["heading_deg"].as_f64().map(|deg| deg + 30.0)});
-    let asked = json!({"pose": ahead, "sensor": {"threshold": 0.5}}).to_string();
-    let reply = daemon.send("POST", "/v1/preview", &asked);
+    let requested = json!({"pose": ahead, "sensor": {"threshold": 0.5}}).to_string();
+    let reply = daemon.send("POST", "/v1/preview", &requested);
     assert_eq!(reply.status, 200, "{}", reply.json());
     let previewed = reply.json();
     assert_eq!(previewed["pings"].as_array().map(Vec::len), Some(8));
@@ -176,14 +176,14 @@ fn sensor_of_an_array() {
     let scan = newest();
     let id = scan["start"]["scan"].as_str().expect("an id");
     let whole = daemon.get(&format!("/v1/scans/{id}")).json();
-    for (said, read) in previewed["pings"]
+    for (printed, read) in previewed["pings"]
         .as_array()
         .expect("them")
         .iter()
         .zip(whole["pings"].as_array().expect("them"))
     {
         for key in ["ranger", "status", "range_m", "viewpoint"] {
-            assert_eq!(said[key], read[key], "{key}: {read}");
+            assert_eq!(printed[key], read[key], "{key}: {read}");
         }
     }
     let plan = r#"{"plan":{"from_deg":0,"to_deg":9,"step_deg":0.9,"pings_per_stop":1}}"#;

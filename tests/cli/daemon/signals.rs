@@ -60,7 +60,7 @@ fn repeated_signals_are_merged() {
             kill_process(pid, second).expect("it runs");
         }
         let code = daemon.child.wait().expect("it ends").code();
-        assert_eq!(code, Some(0), "{first:?}, {second:?} after {gap_ms} ms: {}", daemon.said());
+        assert_eq!(code, Some(0), "{first:?}, {second:?} after {gap_ms} ms: {}", daemon.messages());
         assert_closed(folder.path());
     }
 }
@@ -83,7 +83,7 @@ fn second_signal_forces_the_end() {
         daemon.signal(Signal::TERM);
     }
     let code = daemon.child.wait().expect("it ends").code();
-    assert!(matches!(code, Some(0 | 1)), "{code:?}: {}", daemon.said());
+    assert!(matches!(code, Some(0 | 1)), "{code:?}: {}", daemon.messages());
     drop(silent);
     assert_closed(folder.path());
 }
@@ -134,7 +134,7 @@ fn hangup_without_terminal_reloads() {
     let mock = ["--mock", "--scene", "simple-room", "--pose", "fig9"];
     let daemon = Daemon::start_as(command, folder.path(), &[&mock[..], &FAST].concat());
     daemon.signal(Signal::HUP);
-    wait_until("the reload", || daemon.said().contains("configuration reloaded"));
+    wait_until("the reload", || daemon.messages().contains("configuration reloaded"));
     assert_eq!(daemon.stop(), Some(0));
 }
 

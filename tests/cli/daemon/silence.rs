@@ -19,7 +19,7 @@ fn start(mut command: Command) -> Child {
     command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program starts")
 }
 
-/// What a process has written when it ends, which it must within the time.
+/// Returns the output of a process, which must end within the time.
 fn ended(child: Child, within: Duration) -> Output {
     let (id, since) = (child.id(), Instant::now());
     let waiting = thread::spawn(move || child.wait_with_output().expect("it ends"));
@@ -90,26 +90,26 @@ fn hanging_daemon_is_detected() {
     daemon.signal(Signal::STOP);
     for (child, what) in [(watch, "watch"), (scan, "scan")] {
         let output = ended(child, DETECTED);
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(3), "{what}: {said}");
-        let words = said.replace("\n  │ ", " ").replace('\n', " ");
-        // Between two scans the daemon is asked what it does.
-        let told = ["no data from the daemon for 40 s", "did not respond within 10 s"];
-        assert!(told.iter().any(|told| words.contains(told)), "{what}: {said}");
+        let printed = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(3), "{what}: {printed}");
+        let words = printed.replace("\n  │ ", " ").replace('\n', " ");
+        // Between two scans the client polls the daemon.
+        let reported = ["no data from the daemon for 40 s", "did not respond within 10 s"];
+        assert!(reported.iter().any(|reported| words.contains(reported)), "{what}: {printed}");
     }
     daemon.signal(Signal::CONT);
     // What it had measured before comes first.
     let mut news = BufReader::new(patient.stderr.take().expect("piped")).lines();
-    let mut heard =
+    let mut received =
         |words: &str| news.by_ref().map_while(Result::ok).any(|line| line.contains(words));
-    assert!(heard("no data from the daemon for 40 s"));
-    assert!(heard("reconnected"));
+    assert!(received("no data from the daemon for 40 s"));
+    assert!(received("reconnected"));
     lines.next().expect("it goes on").expect("text");
     several.kill().expect("it runs");
-    let mut said = String::new();
-    several.stderr.take().expect("piped").read_to_string(&mut said).expect("text");
+    let mut printed = String::new();
+    several.stderr.take().expect("piped").read_to_string(&mut printed).expect("text");
     several.wait().expect("it ends");
-    assert!(said.contains("no data from the daemon for 40 s"), "{said}");
+    assert!(printed.contains("no data from the daemon for 40 s"), "{printed}");
     patient.kill().expect("it runs");
     patient.wait().expect("it ends");
     assert_eq!(daemon.stop(), Some(0));

@@ -29,37 +29,37 @@ fn in_process(folder: &Path, pose: &[&str], further: &[&str]) -> InProcess {
     InProcess::start(folder, &[&array, pose, further].concat())
 }
 
-/// One in the laboratory, standing.
-fn standing(folder: &Path, further: &[&str]) -> Daemon {
+/// Starts a stationary simulated array in the laboratory.
+fn start_stationary(folder: &Path, further: &[&str]) -> Daemon {
     start(folder, &[&["--pose", "3,1.2,20"], further].concat())
 }
 
-/// What a subscriber is sent in so many seconds, and when it came.
+/// Returns the records that a subscriber receives within some seconds, with their times.
 fn listen(daemon: &Daemon, path: &str, seconds: f64) -> Vec<(Timestamp, Value)> {
     let mut stream = daemon.connect().expect("it listens");
     stream.set_read_timeout(Some(Duration::from_millis(100))).expect("a socket");
     let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n");
     stream.write_all(request.as_bytes()).expect("it listens");
-    let (until, mut told) = (Instant::now() + Duration::from_secs_f64(seconds), Vec::new());
+    let (until, mut reported) = (Instant::now() + Duration::from_secs_f64(seconds), Vec::new());
     let (mut reader, mut line) = (BufReader::new(stream), Vec::new());
     while Instant::now() < until {
         // A read that times out keeps what it has read.
         if reader.read_until(b'\n', &mut line).is_ok_and(|count| count > 0) {
             let now = Timestamp::now();
             if let Ok(record @ Value::Object(_)) = serde_json::from_slice::<Value>(&line) {
-                told.push((now, record));
+                reported.push((now, record));
             }
             line.clear();
         }
     }
-    told
+    reported
 }
 
-fn pings(told: &[(Timestamp, Value)]) -> Vec<(Timestamp, &Value)> {
-    told.iter().filter(|(_, record)| record["type"] == "ping").map(|(at, r)| (*at, r)).collect()
+fn pings(reported: &[(Timestamp, Value)]) -> Vec<(Timestamp, &Value)> {
+    reported.iter().filter(|(_, record)| record["type"] == "ping").map(|(at, r)| (*at, r)).collect()
 }
 
-/// What `sonard simulate` reads at a pose: status and range by ranger.
+/// Returns the readings of `sonard simulate` at a pose: status and range by ranger.
 fn predicted(pose: &str) -> Vec<(Value, Value)> {
     let output =
         run(&["simulate", "--scene", "mcgill-lab", "--pose", pose, "--array", "pioneer-8"]);
@@ -68,8 +68,8 @@ fn predicted(pose: &str) -> Vec<(Value, Value)> {
     log.pings().iter().map(|ping| (ping["status"].clone(), ping["range_m"].clone())).collect()
 }
 
-/// What the daemon says that its rangers read.
-fn told(daemon: &InProcess) -> Vec<(Value, Value)> {
+/// Returns the readings of the daemon's rangers.
+fn reported(daemon: &InProcess) -> Vec<(Value, Value)> {
     let status = daemon.status();
     let readings = status["simulation"]["readings"].as_array().expect("an array").clone();
     readings.iter().map(|reading| (reading["status"].clone(), reading["range_m"].clone())).collect()
@@ -78,13 +78,13 @@ fn told(daemon: &InProcess) -> Vec<(Value, Value)> {
 #[test]
 fn records_are_marked_simulated() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = standing(folder.path(), &[]);
+    let daemon = start_stationary(folder.path(), &[]);
     daemon.wait_for_scans(1);
-    let told = listen(&daemon, "/v1/live/records", 2.0);
-    for (_, record) in &told {
+    let reported = listen(&daemon, "/v1/live/records", 2.0);
+    for (_, record) in &reported {
         assert_eq!(record["provenance"], "simulated", "{record}");
     }
-    let pings = pings(&told);
+    let pings = pings(&reported);
     let fired: Vec<Timestamp> = pings
         .iter()
         .map(|(_, ping)| ping["time"].as_str().and_then(|t| t.parse().ok()).expect("a time"))
@@ -99,10 +99,10 @@ fn records_are_marked_simulated() {
     let socket = folder.path().join("s");
     let status = run(&["status", "--socket", socket.to_str().expect("plain path")]);
     assert_eq!(status.status.code(), Some(0));
-    let said = String::from_utf8_lossy(&status.stdout).into_owned();
+    let printed = String::from_utf8_lossy(&status.stdout).into_owned();
     assert!(
-        said.contains("SIMULATED") && said.contains("pioneer-8, one ranger every 40"),
-        "{said}"
+        printed.contains("SIMULATED") && printed.contains("pioneer-8, one ranger every 40"),
+        "{printed}"
     );
     let metrics = String::from_utf8(daemon.get("/metrics").body).expect("text");
     assert!(metrics.contains("sonard_simulated 1"), "{metrics}");
@@ -122,7 +122,7 @@ fn readings_after_a_pose_change() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = in_process(folder.path(), &["--pose", "3,1.2,20"], &[]);
     daemon.wait_for_scans(1);
-    assert_eq!(told(&daemon), predicted("3,1.2,20"));
+    assert_eq!(reported(&daemon), predicted("3,1.2,20"));
     for pose in ["2.2,1.4,110", "2.2,1.4,-70"] {
         let [x, y, deg] = pose.split(',').collect::<Vec<_>>()[..] else { panic!("a pose") };
         let body = format!("{{\"x_m\":{x},\"y_m\":{y},\"heading_deg\":{deg}}}");
@@ -130,7 +130,7 @@ fn readings_after_a_pose_change() {
         assert_eq!(daemon.get("/v1/pose").json()["x_m"].as_f64(), x.parse().ok());
         let scans = daemon.health()["scans"]["completed"].as_u64().expect("a count");
         daemon.wait_for_scans(scans + 2);
-        assert_eq!(told(&daemon), predicted(pose), "{pose}");
+        assert_eq!(reported(&daemon), predicted(pose), "{pose}");
     }
     // Places where it can't be, and plans, are refused.
     for (path, body, word) in [
@@ -153,10 +153,10 @@ fn readings_after_a_pose_change() {
 #[test]
 fn deadband_of_subscribers() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = standing(folder.path(), &[]);
+    let daemon = start_stationary(folder.path(), &[]);
     daemon.wait_for_scans(1);
     let quiet = listen(&daemon, "/v1/live/records?moved_m=0.05", 2.0);
-    assert_eq!(pings(&quiet).len(), 8, "each ranger once, and then nothing: the robot stands");
+    assert_eq!(pings(&quiet).len(), 8, "each ranger once, then nothing: the robot is stationary");
     let every = listen(&daemon, "/v1/live/records", 2.0);
     assert!(pings(&every).len() > 24, "{}", pings(&every).len());
     let mover = std::thread::scope(|scope| {
@@ -206,14 +206,14 @@ fn course_and_poses_in_the_log() {
     assert_eq!(pose, json!({"x_m": 3.2, "y_m": 1.2, "heading_deg": 90.0}));
     let scans = daemon.health()["scans"]["completed"].as_u64().expect("a count");
     daemon.wait_for_scans(scans + 2);
-    assert_eq!(told(&daemon), predicted("3.2,1.2,90"));
+    assert_eq!(reported(&daemon), predicted("3.2,1.2,90"));
     daemon.stop();
     println!("{skipped} turns left out");
 
     let log = clean_log(folder.path());
     let moved = log.pings().iter().filter(|ping| ping["pose"].is_object()).count();
     assert!(moved > 50, "{moved} readings from another place than their scan's");
-    // The model in the same places says the same: every place in the log is right.
+    // Predictions at the logged positions equal the readings: every logged position is right.
     let file = logs(folder.path())[0].display().to_string();
     let compared = run(&["compare", &file, "--scene", "mcgill-lab", "--json"]);
     let compared: Value = serde_json::from_slice(&compared.stdout).expect("one object");
@@ -259,15 +259,17 @@ fn synced_records_survive_kill() {
     };
     for turn in 0..4 {
         let before = if turn > 0 { records() } else { 0 };
-        let daemon =
-            standing(folder.path(), &["--set", "log.sync_s=0.1", "--set", "log.daily=false"]);
+        let daemon = start_stationary(
+            folder.path(),
+            &["--set", "log.sync_s=0.1", "--set", "log.daily=false"],
+        );
         wait_until("records", || daemon.status()["log"]["synced"].as_u64() > Some(12));
         std::thread::sleep(Duration::from_millis(37 * turn));
         let synced = daemon.status()["log"]["synced"].as_u64().expect("a count");
         daemon.kill();
         assert!(records() >= before + synced, "{} of {before} and {synced}", records());
     }
-    let daemon = standing(folder.path(), &["--set", "log.daily=false"]);
+    let daemon = start_stationary(folder.path(), &["--set", "log.daily=false"]);
     daemon.wait_for_scans(1);
     assert_eq!(daemon.stop(), Some(0));
     assert_eq!(logs(folder.path()).len(), 1, "the same log goes on");

@@ -66,7 +66,7 @@ fn recovers_and_logs_each_beam() {
     assert!(!logs(folder.path()).is_empty());
 }
 
-/// Lets one thing go wrong for a while and then ends it; says what it was.
+/// Injects one fault for a while and ends it; returns its name.
 fn inject(
     rig: &mut Rig,
     daemon: &Daemon,

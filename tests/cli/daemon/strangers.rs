@@ -1,4 +1,4 @@
-//! Devices that restart, come back as others, or say what can't be.
+//! Devices that restart, are replaced, or report impossible values.
 
 use std::collections::BTreeSet;
 
@@ -16,7 +16,7 @@ fn start(folder: &std::path::Path, faults: &str, further: &[&str]) -> Daemon {
     daemon
 }
 
-/// Checks each reading against the session that it stands in; how many sessions of each kind had
+/// Checks each reading against its session; returns the kinds of sessions that had
 /// readings, by serial, provenance and steps a revolution.
 fn sessions_of_readings(log: &Log) -> BTreeSet<String> {
     let mut session = &Value::Null;
@@ -44,7 +44,7 @@ fn sessions_of_readings(log: &Log) -> BTreeSet<String> {
 
 #[test]
 fn changed_board_starts_a_session() {
-    for (lie, kind, said) in [
+    for (lie, kind, printed) in [
         ("other-steps", "MOCK-00001 mock 800", "800 steps per revolution, not 400"),
         ("other-serial", "OTHER-0002 mock 400", "OTHER-0002, not MOCK-00001"),
         ("emulator", "MOCK-00001 emulator 400", "-SIMULATED"),
@@ -58,7 +58,7 @@ fn changed_board_starts_a_session() {
         let kinds = sessions_of_readings(&log);
         let first = "MOCK-00001 mock 400".to_owned();
         assert_eq!(kinds, BTreeSet::from([first, kind.to_owned()]), "{lie}");
-        assert!(log.events().iter().any(|event| event.contains(said)), "{:?}", log.events());
+        assert!(log.events().iter().any(|event| event.contains(printed)), "{:?}", log.events());
     }
 }
 

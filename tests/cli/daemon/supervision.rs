@@ -55,7 +55,7 @@ fn wait_for_end(daemon: &mut Daemon, limit: Duration) -> Option<ExitStatus> {
     None
 }
 
-/// Whether this build has a task.
+/// Returns `true` if this build has a task.
 fn is_built(task: Task) -> bool {
     (task != Task::Mqtt || cfg!(feature = "mqtt")) && (task != Task::Ros || cfg!(feature = "ros"))
 }
@@ -73,7 +73,7 @@ fn failed_task_ends_the_process() {
         // The reader of standard error may be behind.
         let since = Instant::now();
         let messages = loop {
-            let messages = daemon.said();
+            let messages = daemon.messages();
             if messages.contains(&report) || since.elapsed() > Duration::from_secs(10) {
                 break messages;
             }

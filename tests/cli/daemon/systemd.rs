@@ -1,4 +1,4 @@
-//! What the daemon tells systemd, and the socket that systemd hands over.
+//! Notifications to systemd, and the socket that systemd passes.
 
 use std::{
     os::unix::net::UnixDatagram,
@@ -9,21 +9,22 @@ use std::{
 
 use sonard::mock::Pace;
 
-use super::{Daemon, ask, rig::Rig};
+use super::{Daemon, request, rig::Rig};
 use crate::common::{sonard, wait_until};
 
-/// Everything said to `socket` until `wanted` was among it.
-fn hear(socket: &UnixDatagram, wanted: &str) -> String {
-    let mut said = String::new();
+/// Returns the notifications to `socket` up to the one that contains `wanted`.
+fn receive(socket: &UnixDatagram, wanted: &str) -> String {
+    let mut printed = String::new();
     let mut datagram = [0; 4096];
     let until = Instant::now() + Duration::from_secs(20);
-    while !said.contains(wanted) {
-        assert!(Instant::now() < until, "no {wanted} in {said}");
-        let count = socket.recv(&mut datagram).unwrap_or_else(|_| panic!("no {wanted} in {said}"));
-        said += &String::from_utf8_lossy(&datagram[..count]);
-        said.push('\n');
+    while !printed.contains(wanted) {
+        assert!(Instant::now() < until, "no {wanted} in {printed}");
+        let count =
+            socket.recv(&mut datagram).unwrap_or_else(|_| panic!("no {wanted} in {printed}"));
+        printed += &String::from_utf8_lossy(&datagram[..count]);
+        printed.push('\n');
     }
-    said
+    printed
 }
 
 #[test]
@@ -39,20 +40,20 @@ fn ready_and_watchdog() {
     let options: Vec<&str> = options.iter().map(String::as_str).collect();
     let continuous = ["--set", "scanning.mode=continuous"];
     let daemon = Daemon::start_as(command, folder.path(), &[&options[..], &continuous].concat());
-    let mut waiting = hear(&socket, "EXTEND_TIMEOUT_USEC");
+    let mut waiting = receive(&socket, "EXTEND_TIMEOUT_USEC");
     for _ in 0..4 {
-        waiting += &hear(&socket, "WATCHDOG=1");
+        waiting += &receive(&socket, "WATCHDOG=1");
     }
     assert!(waiting.contains("STATUS=absent: ") && !waiting.contains("READY=1"), "{waiting}");
     rig.plug("", 1);
-    hear(&socket, "READY=1");
-    hear(&socket, "STATUS=scanning");
+    receive(&socket, "READY=1");
+    receive(&socket, "STATUS=scanning");
     for _ in 0..3 {
-        hear(&socket, "WATCHDOG=1");
+        receive(&socket, "WATCHDOG=1");
     }
-    let reader = std::thread::spawn(move || hear(&socket, "STOPPING=1"));
+    let reader = std::thread::spawn(move || receive(&socket, "STOPPING=1"));
     assert_eq!(daemon.stop(), Some(0));
-    reader.join().expect("it says that it stops");
+    reader.join().expect("a notification of the end");
 }
 
 #[test]
@@ -84,5 +85,5 @@ fn socket_activation() {
 
 fn status(socket: &Path) -> u16 {
     let stream = std::os::unix::net::UnixStream::connect(socket).expect("it listens");
-    ask(stream, "GET", "/v1/status", &[("Host", "localhost")], "").status
+    send_request(stream, "GET", "/v1/status", &[("Host", "localhost")], "").status
 }

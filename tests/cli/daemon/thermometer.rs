@@ -41,14 +41,19 @@ fn zeros() {
     wait_until("the report", || reasons(&daemon).contains("all registers of the sensor are 00"));
     let now = air(&daemon);
     assert_eq!((&now["temperature_c"], &now["source"]), (&20.0.into(), &"configuration".into()));
-    wait_until("the message", || daemon.said().contains("all registers of the sensor are 00"));
+    wait_until("the message", || daemon.messages().contains("all registers of the sensor are 00"));
 
     fs::write(&file, ZERO_C).expect("a file");
     wait_until("0 C", || air(&daemon)["temperature_c"] == 0.0);
     let now = air(&daemon);
     assert_eq!((&now["source"], &now["error"]), (&"file".into(), &Value::Null));
     assert!(!reasons(&daemon).contains("thermometer"), "{}", reasons(&daemon));
-    assert_eq!(daemon.said().matches("WARN the thermometer").count(), 1, "{}", daemon.said());
+    assert_eq!(
+        daemon.messages().matches("WARN the thermometer").count(),
+        1,
+        "{}",
+        daemon.messages()
+    );
 }
 
 #[test]
@@ -109,7 +114,7 @@ fn slow_changes() {
         let expected = f64::from(thousandths) / 1e3;
         wait_until("the change", || air(&daemon)["temperature_c"] == expected);
     }
-    assert!(!daemon.said().contains("WARN"), "{}", daemon.said());
+    assert!(!daemon.messages().contains("WARN"), "{}", daemon.messages());
 }
 
 #[test]

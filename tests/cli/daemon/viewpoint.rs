@@ -1,4 +1,4 @@
-//! Where each reading was taken, as the API tells it: of an array, and of a transducer beside its axis.
+//! Viewpoints of readings in the API: of an array, and of a transducer beside its axis.
 
 use std::io::{BufRead as _, BufReader, Write as _};
 
@@ -24,16 +24,16 @@ fn distance([x, y]: [f64; 2], [u, v]: [f64; 2]) -> f64 {
     (x - u).hypot(y - v)
 }
 
-/// Where a reading was taken, and where it pointed, degrees.
+/// Viewpoint of a reading: position, and direction in degrees.
 fn viewpoint(reading: &Value) -> ([f64; 2], f64) {
     let number = |name: &str| reading["viewpoint"][name].as_f64().expect("a figure");
     ([number("x_m"), number("y_m")], number("direction_deg"))
 }
 
-/// That each path begins and ends at its reading's transducer, and that half of it is the range but for
-/// what `late_m` allows, of how far the echo is over its threshold in decibels. Returns how many were heard.
+/// Checks that each path begins and ends at its transducer, and that half its length is the range except for
+/// the time walk that `late_m` allows for a margin over the threshold, decibels. Returns the number of echoes.
 fn check_paths(get: impl Fn(&str) -> Reply, whole: &Value, late_m: impl Fn(f64) -> f64) -> usize {
-    let mut heard = 0;
+    let mut received = 0;
     for reading in whole["pings"].as_array().expect("readings") {
         let scan = reading["scan"].as_str().expect("an id");
         let beam = get(&format!("/v1/scans/{scan}/beams/{}", reading["index"])).json();
@@ -50,12 +50,12 @@ fn check_paths(get: impl Fn(&str) -> Reply, whole: &Value, late_m: impl Fn(f64) 
         let late = range_m - length_m / 2.0;
         let most = late_m(over_db.expect("a margin"));
         assert!((-1e-3..=most).contains(&late), "{reading}: {late} m beyond its path");
-        heard += 1;
+        received += 1;
     }
-    heard
+    received
 }
 
-/// Time walk: how much later than its path says an echo is heard, metres. Weak ones rise slowly to the
+/// Time walk: delay of the detection after the path's length, metres. Weak echoes rise slowly to the
 /// threshold; those of the tests' rooms, 20 dB above it and more, within 4 mm.
 fn time_walk_m(over_db: f64) -> f64 {
     if over_db > 20.0 { 4e-3 } else { 35e-3 }
@@ -103,7 +103,7 @@ fn offset_transducer() {
         live.write_all(request.as_bytes()).expect("it listens");
         wait_until("the stream", || daemon.status()["subscribers"]["now"] == 1);
         assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
-        let told: Vec<Value> = BufReader::new(live)
+        let reported: Vec<Value> = BufReader::new(live)
             .lines()
             .filter_map(|line| serde_json::from_str(&line.ok()?).ok())
             .take_while(|record: &Value| record["type"] != "scan_end")
@@ -113,8 +113,8 @@ fn offset_transducer() {
         let whole = newest(|path| daemon.get(path));
         assert!(check_paths(|path| daemon.get(path), &whole, late_m) >= 10);
         let readings = whole["pings"].as_array().expect("readings");
-        assert_eq!(told.len(), readings.len());
-        for (live, reading) in told.iter().zip(readings) {
+        assert_eq!(reported.len(), readings.len());
+        for (live, reading) in reported.iter().zip(readings) {
             assert_eq!(live["viewpoint"], reading["viewpoint"]);
             let (from, direction_deg) = viewpoint(reading);
             let (sin, cos) = direction_deg.to_radians().sin_cos();

@@ -28,9 +28,9 @@ const WITH_VALUE: [&str; 6] =
     ["--columns", "--decimal", "--range-unit", "--time-format", "--azimuth-deg", "--utc-offset"];
 
 /// The answers that a message offers, the words of each.
-fn offered(said: &str) -> Vec<Vec<String>> {
+fn offered(printed: &str) -> Vec<Vec<String>> {
     let mut answers: Vec<Vec<String>> = Vec::new();
-    let mut words = split(said).into_iter().peekable();
+    let mut words = split(printed).into_iter().peekable();
     let mut is_going_on = false;
     while let Some(word) = words.next() {
         let option = word.trim_end_matches([';', ',']).to_owned();
@@ -153,9 +153,9 @@ fn offered_options_work() {
         fs::write(&path, text).expect("writes");
         let path = path.to_str().expect("a plain path");
         let given = ["import", path, "--sensor", "hc-sr04"];
-        let said = refused(&given);
-        let answers = offered(&said);
-        assert!(!answers.is_empty(), "{name}: {said}");
+        let message = refused(&given);
+        let answers = offered(&message);
+        assert!(!answers.is_empty(), "{name}: {message}");
         let read: Vec<_> = answers
             .iter()
             .filter_map(|answer| {
@@ -191,11 +191,11 @@ fn dry_run_writes_no_log() {
         "--scene",
         "simple-room",
     ]);
-    let said = crate::common::stderr(&output);
-    assert!(output.status.success() && output.stdout.is_empty(), "{said}");
+    let printed = crate::common::stderr(&output);
+    assert!(output.status.success() && output.stdout.is_empty(), "{printed}");
     for part in ["columns: ", "columns not used: `n`", "counter-clockwise", "1 scans, 36 readings"]
     {
-        assert!(said.contains(part), "{part}: {said}");
+        assert!(printed.contains(part), "{part}: {printed}");
     }
     assert!(fs::read_to_string(path("a.svg")).expect("drawn").starts_with("<svg"));
     refused(&["import", &path("a.csv"), "--dry-run", "-o", &path("a.jsonl")]);

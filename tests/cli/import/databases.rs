@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use rusqlite::{Connection, params};
 
-use super::{done, heard, places, refused};
+use super::{done, places, received, refused};
 use crate::common::{run, stderr};
 
 const TABLES: &str = "CREATE TABLE schema(schema_version INTEGER PRIMARY KEY, ros_distro TEXT NOT NULL);
@@ -53,11 +53,11 @@ fn sqlite_equals_mcap() {
     let of_mcap = done(&["import", &recording]);
     for given in [&bag, &path("bag/bag_0.db3")] {
         let of_database = done(&["import", given]);
-        assert_eq!(heard(&of_database), heard(&of_mcap));
+        assert_eq!(received(&of_database), received(&of_mcap));
         assert_eq!(places(&of_database), places(&of_mcap));
         assert_eq!(of_database, done(&["import", given]), "the same log whenever it is imported");
     }
-    // What its session says that it is of is the file, and not what was made of it.
+    // Its session names the file, not the conversion.
     let sum = std::process::Command::new("sha256sum").arg(&database).output().expect("starts");
     let sum = String::from_utf8_lossy(&sum.stdout)[..64].to_owned();
     assert!(done(&["import", &path("bag/bag_0.db3")]).contains(&sum));
@@ -77,8 +77,8 @@ fn invalid_databases() {
         let database = Connection::open(path(name)).expect("a database");
         database.execute_batch(tables).expect("tables");
         drop(database);
-        let told = refused(&["import", &path(name)]);
-        assert!(told.contains("not a recording of ROS 2"), "{name}: {told}");
+        let reported = refused(&["import", &path(name)]);
+        assert!(reported.contains("not a recording of ROS 2"), "{name}: {reported}");
     }
     let empty = Connection::open(path("empty.db3")).expect("a database");
     empty.execute_batch(TABLES).expect("tables");

@@ -42,7 +42,7 @@ fn unsupported_files() {
     ] {
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).expect("writes");
-        let said = refused(&["import", path.to_str().expect("a plain path")]);
-        assert!(said.contains(what) && said.contains(way), "{name}: {said}");
+        let message = refused(&["import", path.to_str().expect("a plain path")]);
+        assert!(message.contains(what) && message.contains(way), "{name}: {message}");
     }
 }

@@ -69,10 +69,10 @@ fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
-/// How many searches a calibration went on after, as it says.
+/// Returns the number of searches after which a calibration continued, from its output.
 fn known(output: &Output) -> usize {
-    let said = stderr(output);
-    let words = said.split("resuming after ").nth(1).unwrap_or_else(|| panic!("{said}"));
+    let printed = stderr(output);
+    let words = printed.split("resuming after ").nth(1).unwrap_or_else(|| panic!("{printed}"));
     words.split(' ').next().and_then(|count| count.parse().ok()).expect("a number")
 }
 
@@ -122,9 +122,9 @@ fn interrupt_and_lock() {
     let less = ["--fit", "pose,air"];
     for (log, fit) in [(&*case.log, less), (other, fit)] {
         let refused = run(&[&["calibrate", log][..], &fit, &believed].concat());
-        let said = stderr(&refused);
-        assert_eq!(refused.status.code(), Some(2), "{said}");
-        assert!(said.contains(UNFINISHED) && said.contains("--force"), "{said}");
+        let message = stderr(&refused);
+        assert_eq!(refused.status.code(), Some(2), "{message}");
+        assert!(message.contains(UNFINISHED) && message.contains("--force"), "{message}");
         assert_eq!(fs::read(&unfinished).expect("it is kept"), kept);
     }
     // What a killed one has begun to write it may write again.

@@ -19,7 +19,7 @@ fn append_needs_the_same_setup() {
         ("fig9", &["--engine", "cone"], "model"),
     ] {
         let refused = short_scan(pose, out, further);
-        let message = said(&refused);
+        let message = joined_stderr(&refused);
         assert_eq!(refused.status.code(), Some(2), "{message}");
         assert!(message.contains("a different setup") && message.contains(difference), "{message}");
         assert_eq!(fs::read(out.join("scan.jsonl")).expect("kept"), was, "{difference}");

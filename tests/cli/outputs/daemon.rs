@@ -1,4 +1,4 @@
-//! What a daemon makes in the place of what is there: its socket, and logs in its folder.
+//! Files that a daemon replaces: its socket, and logs in its folder.
 
 use super::*;
 

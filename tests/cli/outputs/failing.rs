@@ -23,7 +23,7 @@ fn full_disk_keeps_the_old_file() {
         (&path("t.mcap"), vec!["export", &path("fig9.jsonl"), "-o", &path("t.mcap")]),
         (&path("map/map.pgm"), vec!["map", &path("fig9.jsonl"), "--out", &path("map")]),
     ] {
-        // Blocks of 512 bytes: less than any of these files. Nothing is said of signals.
+        // Blocks of 512 bytes: less than any of these files. Signals are not mentioned.
         let limited = sonard(&arguments);
         let mut shell = std::process::Command::new("sh");
         shell.args(["-c", "ulimit -f 1; exec \"$0\" \"$@\""]).arg(limited.get_program());

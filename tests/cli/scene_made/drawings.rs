@@ -187,11 +187,11 @@ fn markers_and_clip_paths() {
     assert_eq!(svg(&moved).0, [[5.0, 4.0, 7.0, 4.0]]);
     let inner = "<svg x='20' y='20' width='40' height='40' viewBox='0 0 40 40'><line x1='10' y1='20' x2='70' y2='20' stroke='black'/></svg>";
     assert_eq!(svg(inner).0, [[3.0, 4.0, 6.0, 4.0]]);
-    let (found, said) = svg(&clip.replace(
+    let (found, printed) = svg(&clip.replace(
         "<rect x='40' y='0' width='20' height='80'/>",
         "<circle cx='50' cy='40' r='10'/>",
     ));
-    assert_eq!((found, said), (vec![[4.0, 4.0, 6.0, 4.0]], String::new()));
+    assert_eq!((found, printed), (vec![[4.0, 4.0, 6.0, 4.0]], String::new()));
 }
 
 #[test]
@@ -204,6 +204,6 @@ fn compressed_and_unsized_drawings() {
     fs::write(&path, packed.finish().expect("memory takes it")).expect("writable");
     let output =
         run(&["scene", "from-svg", path.to_str().expect("a plain path"), "--width-m", "10"]);
-    let said = stderr(&output);
-    assert!(output.status.success() && said.contains("neither width nor viewBox"), "{said}");
+    let printed = stderr(&output);
+    assert!(output.status.success() && printed.contains("neither width nor viewBox"), "{printed}");
 }

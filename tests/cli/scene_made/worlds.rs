@@ -17,14 +17,14 @@ fn block(name: &str, pose: &str, size: &str) -> String {
     )
 }
 
-/// The corners of what is found in a world, each extent rounded to millimetres, and what is said.
+/// Returns the extents of the walls in a world, rounded to millimetres, and the messages.
 fn extents(text: &str) -> (Vec<[f64; 4]>, String) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.sdf");
     fs::write(&path, text).expect("writable");
     let output = run(&["scene", "from-sdf", path.to_str().expect("a plain path")]);
-    let said = stderr(&output);
-    assert!(output.status.success(), "{said}");
+    let printed = stderr(&output);
+    assert!(output.status.success(), "{printed}");
     let scene =
         Scene::from_json(&String::from_utf8(output.stdout).expect("text")).expect("a scene");
     let mut found: Vec<(String, [f64; 4])> = Vec::new();
@@ -40,7 +40,7 @@ fn extents(text: &str) -> (Vec<[f64; 4]>, String) {
         }
     }
     let rounded = |extent: [f64; 4]| extent.map(|m| (1e3 * m).round() / 1e3 + 0.0);
-    (found.into_iter().map(|(_, extent)| rounded(extent)).collect(), said)
+    (found.into_iter().map(|(_, extent)| rounded(extent)).collect(), printed)
 }
 
 #[test]
@@ -91,8 +91,8 @@ fn relative_poses() {
             [0.9, 0.0, 1.1, 2.0],
         ),
     ] {
-        let (found, said) = extents(&world(&content));
-        assert_eq!((found, said.as_str()), (vec![expected], ""), "{content}");
+        let (found, printed) = extents(&world(&content));
+        assert_eq!((found, printed.as_str()), (vec![expected], ""), "{content}");
     }
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.sdf");
@@ -122,8 +122,8 @@ fn ignored_objects_are_reported() {
         ),
         ("<include><uri>model://chair</uri></include>", "model://chair"),
     ] {
-        let (found, said) = extents(&world(&format!("{plain}{content}")));
-        assert!(found.len() == 1 && said.contains(part), "{part}: {said}");
+        let (found, printed) = extents(&world(&format!("{plain}{content}")));
+        assert!(found.len() == 1 && printed.contains(part), "{part}: {printed}");
     }
 }
 

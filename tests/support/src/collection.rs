@@ -22,8 +22,8 @@ step_deg = 3.6
 max_range_m = 1.5
 ";
 
-/// What it said on standard error, on one line however it was wrapped.
-pub fn said(output: &Output) -> String {
+/// Returns standard error with line breaks and repeated blanks joined.
+pub fn joined_stderr(output: &Output) -> String {
     stderr(output).replace('\u{2502}', " ").split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
@@ -69,7 +69,7 @@ impl Case {
         run(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
     }
 
-    /// The same, which must end with every scan there.
+    /// Runs a collection that must complete every scan.
     pub fn collect_all(&self, further: &[&str]) -> Output {
         let output = self.collect(further);
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
@@ -100,12 +100,12 @@ impl Case {
         Log::read(&self.path("out/scans").join(name))
     }
 
-    /// What `--verify` says, and its exit code.
+    /// Returns the output of `--verify` and its exit code.
     pub fn verify(&self) -> (Option<i32>, String) {
         let out = self.path("out");
         let output = run(&["collect", "--verify", out.to_str().expect("plain path")]);
-        let said = String::from_utf8_lossy(&output.stdout).into_owned() + &stderr(&output);
-        (output.status.code(), said)
+        let printed = String::from_utf8_lossy(&output.stdout).into_owned() + &stderr(&output);
+        (output.status.code(), printed)
     }
 
     /// Fails unless every pose has every repeat exactly once, whole, under its own name.
@@ -127,8 +127,8 @@ impl Case {
         }
         assert_eq!(self.files("scans"), names);
         assert_eq!(self.files("in-progress"), Vec::<String>::new());
-        let (code, said) = self.verify();
-        assert_eq!(code, Some(0), "{said}");
+        let (code, printed) = self.verify();
+        assert_eq!(code, Some(0), "{printed}");
         let manifest = self.manifest();
         assert_eq!(
             (&manifest["complete"], &manifest["counts"]["accepted"]),

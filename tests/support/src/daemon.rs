@@ -32,7 +32,7 @@ pub(crate) const ARRAY: [&str; 7] =
 pub struct Daemon {
     pub child: Child,
     pub folder: PathBuf,
-    said: Arc<Mutex<String>>,
+    printed: Arc<Mutex<String>>,
 }
 
 /// An answer.
@@ -55,19 +55,19 @@ impl Daemon {
         Self::start_as(sonard(&[]), folder, further)
     }
 
-    /// The same with a mock in the simple room, in real time.
+    /// Starts a daemon with a mock in the simple room, in real time.
     pub fn start_mock(folder: &Path, further: &[&str]) -> Self {
         Self::start(folder, &[&MOCK[..], further].concat())
     }
 
-    /// The same by a command that ends in the program.
+    /// Starts a daemon by a command that ends in the program.
     pub fn start_as(command: Command, folder: &Path, further: &[&str]) -> Self {
         let daemon = Self::spawn(command, folder, further);
         wait_until("the API", || daemon.connect().is_ok());
         daemon
     }
 
-    /// The same without waiting for its API.
+    /// Starts a daemon without waiting for its API.
     pub fn spawn(mut command: Command, folder: &Path, further: &[&str]) -> Self {
         let mut child = command
             .args(["run", "--log"])
@@ -80,21 +80,21 @@ impl Daemon {
             .stderr(Stdio::piped())
             .spawn()
             .expect("the program starts");
-        let said = Arc::new(Mutex::new(String::new()));
+        let printed = Arc::new(Mutex::new(String::new()));
         let lines = BufReader::new(child.stderr.take().expect("piped"));
-        let heard = Arc::clone(&said);
+        let received = Arc::clone(&printed);
         std::thread::spawn(move || {
             for line in lines.lines().map_while(Result::ok) {
-                *heard.lock().expect("no panic") += &(line + "\n");
+                *received.lock().expect("no panic") += &(line + "\n");
             }
         });
-        Self { child, folder: folder.into(), said }
+        Self { child, folder: folder.into(), printed }
     }
 
     /// A daemon that was started with `--log` and `--socket` as [`spawn`](Self::spawn) does, and whose standard error
     /// belongs to the test.
     pub fn from_child(child: Child, folder: &Path) -> Self {
-        let daemon = Self { child, folder: folder.into(), said: Arc::default() };
+        let daemon = Self { child, folder: folder.into(), printed: Arc::default() };
         wait_until("the API", || daemon.connect().is_ok());
         daemon
     }
@@ -103,8 +103,8 @@ impl Daemon {
         self.child.id()
     }
 
-    pub fn said(&self) -> String {
-        self.said.lock().expect("no panic").clone()
+    pub fn messages(&self) -> String {
+        self.messages.lock().expect("no panic").clone()
     }
 
     pub fn connect(&self) -> std::io::Result<UnixStream> {
@@ -122,19 +122,19 @@ impl Daemon {
 
     /// Address of the daemon's TCP server.
     pub fn address(&self) -> String {
-        wait_until("the address", || self.said().contains("http://"));
-        let said = self.said();
-        let address = said.split("http://").nth(1).expect("it says where it listens");
+        wait_until("the address", || self.messages().contains("http://"));
+        let printed = self.messages();
+        let address = printed.split("http://").nth(1).expect("the address");
         address.split_whitespace().next().expect("an address").to_owned()
     }
 
     pub fn get(&self, path: &str) -> Reply {
-        ask(self.connect().expect("it listens"), "GET", path, &[("Host", "localhost")], "")
+        send_request(self.connect().expect("it listens"), "GET", path, &[("Host", "localhost")], "")
     }
 
     pub fn send(&self, method: &str, path: &str, body: &str) -> Reply {
         let headers = [("Host", "localhost"), ("Content-Type", "application/json")];
-        ask(self.connect().expect("it listens"), method, path, &headers, body)
+        send_request(self.connect().expect("it listens"), method, path, &headers, body)
     }
 
     pub fn status(&self) -> Value {
@@ -193,7 +193,7 @@ pub fn start_ahead(folder: &Path, further: &[&str]) -> Daemon {
     Daemon::start(folder, &[&mock, &quiet[..], further].concat())
 }
 
-/// Eight sonars of the model in the laboratory, standing.
+/// Starts a stationary simulated array of eight rangers in the laboratory.
 pub fn start_array(folder: &Path, further: &[&str]) -> Daemon {
     Daemon::start(folder, &[&ARRAY[..], further].concat())
 }
@@ -264,15 +264,15 @@ pub fn clean_log(folder: &Path) -> Log {
     let mut text = String::new();
     for log in logs(folder) {
         let verified = run(&["log", "verify", log.to_str().expect("plain path")]);
-        let said = String::from_utf8_lossy(&verified.stdout).into_owned();
-        assert_eq!(verified.status.code(), Some(0), "{said}");
+        let printed = String::from_utf8_lossy(&verified.stdout).into_owned();
+        assert_eq!(verified.status.code(), Some(0), "{printed}");
         text += &fs::read_to_string(&log).expect("readable");
     }
     Log::parse(&text)
 }
 
 /// Sends a request on a connection of its own and reads the answer to its end.
-pub fn ask(
+pub fn send_request(
     mut stream: impl Read + Write,
     method: &str,
     path: &str,

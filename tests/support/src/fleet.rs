@@ -17,7 +17,7 @@ pub const SCANNING: [&str; 6] = [
     "model.max_range_m=3",
 ];
 
-/// Three robots, one of them on a ranger that can be pulled out, and a daemon that asks them.
+/// Three robots, one of them with a removable ranger, and a daemon that polls them.
 pub struct Fleet {
     pub rig: Rig,
     /// The one on the rig, and two on mocks.
@@ -82,7 +82,7 @@ impl Fleet {
     }
 }
 
-/// Waits until it said where it listens by TCP: the socket may answer before that is read.
+/// Waits for the TCP address: the socket may answer before the address is read.
 pub fn until_it_listens(daemon: &Daemon) {
-    wait_until("its address", || daemon.said().contains("http://"));
+    wait_until("its address", || daemon.messages().contains("http://"));
 }

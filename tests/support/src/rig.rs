@@ -94,7 +94,7 @@ impl Rig {
         }
     }
 
-    /// Something that takes bytes and says nothing, as a board that hangs; until dropped.
+    /// Connects a port that reads bytes and never replies, as a hanging board, until dropped.
     pub fn plug_silent(&mut self) -> Pty {
         self.unplug();
         Pty::open(Some(&self.link)).expect("a pty")

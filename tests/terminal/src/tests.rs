@@ -8,7 +8,7 @@ use rexpect::{
 
 use sonard_test_support::{collection::Case, program, sonard};
 
-/// Somebody at a terminal of their own, in which a collection runs.
+/// A user at a terminal of their own, in which a collection runs.
 struct Person(PtySession);
 
 impl Person {
@@ -26,19 +26,19 @@ impl Person {
         self.0.send_line(line).expect("it listens");
     }
 
-    /// Waits for a question and presses Ctrl-C; what was said then, and the exit code.
+    /// Waits for a question and presses Ctrl-C; returns the output after that and the exit code.
     fn interrupts_at(mut self, question: &str) -> (String, i32) {
         self.0.exp_string(question).expect(question);
         self.0.send_control('c').expect("it listens");
         self.waits()
     }
 
-    /// Waits for the end; what was said until then, and the exit code.
+    /// Waits for the end; returns the output until then and the exit code.
     fn waits(mut self) -> (String, i32) {
-        let said = self.0.exp_eof().expect("it ends");
+        let printed = self.0.exp_eof().expect("it ends");
         match self.0.process().wait().expect("it ended") {
-            WaitStatus::Exited(_, code) => (said, code),
-            other => panic!("{other:?}: {said}"),
+            WaitStatus::Exited(_, code) => (printed, code),
+            other => panic!("{other:?}: {printed}"),
         }
     }
 }
@@ -53,19 +53,22 @@ fn at_a_terminal_enter_goes_on_and_an_interrupt_can_be_gone_on_from() {
     ada.answers("operator:", "Ada");
     ada.answers("put the ranger at fig9, pose 1, and press Enter:", "");
     ada.answers("door:", "open");
-    let (said, code) = ada.interrupts_at("put the ranger at fig7");
-    assert!(code == 1 && said.contains("1 of 2 scans") && said.contains("stopped"), "{said}");
-    assert!(!said.contains(" beams"), "a bar was drawn over the question: {said:?}");
+    let (printed, code) = ada.interrupts_at("put the ranger at fig7");
+    assert!(
+        code == 1 && printed.contains("1 of 2 scans") && printed.contains("stopped"),
+        "{printed}"
+    );
+    assert!(!printed.contains(" beams"), "a bar was drawn over the question: {printed:?}");
     assert_eq!(case.files("in-progress"), Vec::<String>::new());
     assert_eq!(case.manifest()["complete"], false);
 
     let mut bob = Person::starts(&case);
     bob.answers("operator:", "Bob");
-    // The first pose is done: nobody is sent there again.
+    // The first pose is complete and not requested again.
     bob.answers("put the ranger at", "");
     bob.answers("pose 2, fig7: door:", "shut");
-    let (said, code) = bob.waits();
-    assert!(code == 0 && said.contains("2 of 2 scans"), "{said}");
+    let (printed, code) = bob.waits();
+    assert!(code == 0 && printed.contains("2 of 2 scans"), "{printed}");
     case.assert_each_scan_once(2, 1, 25);
     for (name, operator, door) in
         [("p001-r01.jsonl", "Ada", "open"), ("p002-r01.jsonl", "Bob", "shut")]
@@ -82,8 +85,8 @@ fn poses_typed_at_a_terminal_are_kept_over_an_interrupt() {
     let mut person = Person::starts(&case);
     person.answers("pose 1 (", "5,5,0");
     person.answers("pose 1 (", "fig9");
-    let (said, code) = person.interrupts_at("pose 2 (");
-    assert!(code == 1 && said.contains("1 of 1 scans"), "{said}");
+    let (printed, code) = person.interrupts_at("pose 2 (");
+    assert!(code == 1 && printed.contains("1 of 1 scans"), "{printed}");
 
     let mut person = Person::starts(&case);
     person.answers("pose 2 (", "0.5,0.3,90");

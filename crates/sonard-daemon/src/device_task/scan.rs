@@ -65,17 +65,17 @@ impl DeviceTask {
     async fn prepare(
         &mut self,
         identity: &Identity,
-        asked: Option<QueuedScans>,
+        requested: Option<QueuedScans>,
     ) -> Option<ScanJob> {
         if std::mem::take(&mut self.control.stale) {
             self.predictions.clear();
         }
         let air = self.control.air.settled();
-        let pose = asked.and_then(|request| request.pose).unwrap_or(self.control.pose);
-        let plan = asked.and_then(|request| request.plan).unwrap_or(self.control.plan);
+        let pose = requested.and_then(|request| request.pose).unwrap_or(self.control.pose);
+        let plan = requested.and_then(|request| request.plan).unwrap_or(self.control.plan);
         let key = (pose, plan, air);
         if let Err(error) = plan.motor_steps(identity.steps_per_revolution.into()) {
-            return self.abandon_scans(&error.to_string(), asked);
+            return self.abandon_scans(&error.to_string(), requested);
         }
         if !self.predictions.contains(key) {
             let predicting = predict(&self.control.settings, key);
@@ -84,7 +84,7 @@ impl DeviceTask {
                     self.react(interrupt);
                     return None;
                 }
-                Ok(Err(why)) => return self.abandon_scans(&why, asked),
+                Ok(Err(why)) => return self.abandon_scans(&why, requested),
                 Ok(Ok(predicted)) => {
                     if let Some(why) = &predicted.refusal {
                         tracing::warn!("scans have no predictions: {why}");
@@ -103,7 +103,7 @@ impl DeviceTask {
                     self.react(interrupt);
                     return None;
                 }
-                Ok(Err(why)) => return self.abandon_scans(&why, asked),
+                Ok(Err(why)) => return self.abandon_scans(&why, requested),
                 Ok(Ok(())) => {}
             }
         }
@@ -111,7 +111,7 @@ impl DeviceTask {
         self.publish_session(session);
         let scan_air = self.control.air.scan_air(&air, Instant::now());
         let job = self.predictions.job(&self.control.settings, key, scan_air, identity);
-        Some(ScanJob { request: asked.map(|request| request.request), ..job })
+        Some(ScanJob { request: requested.map(|request| request.request), ..job })
     }
 
     /// Pauses scanning, or cancels only the request if the failure comes from its own plan or pose.

@@ -24,7 +24,7 @@ pub(crate) struct SweepStats {
     /// Headings, in degrees.
     headings: AngleStats,
     places: EchoPositions,
-    /// The same, with directions from the x axis for a robot with a heading.
+    /// Positions with directions from the x axis, for a robot with a heading.
     turned_places: EchoPositions,
     order: SweepOrder,
 }

@@ -74,7 +74,7 @@ pub fn regions(sweep: &Sweep, settings: &InterpretSettings) -> Vec<Region> {
     while done < count {
         let first = start + done;
         let last = finder.last_of(first, count - done, settings.max_holes);
-        if !matches!(finder.heard(first), BeamOutcome::NoEcho) {
+        if !matches!(finder.outcome_at(first), BeamOutcome::NoEcho) {
             found.push(finder.region(first, last));
         }
         done += last - first + 1;
@@ -90,7 +90,7 @@ struct Finder<'a> {
 }
 
 impl Finder<'_> {
-    fn heard(&self, at: usize) -> BeamOutcome {
+    fn outcome_at(&self, at: usize) -> BeamOutcome {
         self.sweep.beams[at % self.sweep.beams.len()].outcome
     }
 
@@ -100,8 +100,8 @@ impl Finder<'_> {
 
     /// Returns `true` if the beam does not continue the region of the preceding one.
     fn begins(&self, at: usize) -> bool {
-        let before = self.heard(at + self.sweep.beams.len() - 1);
-        self.gap_before_deg(at).is_none() || !self.same(before, self.heard(at))
+        let before = self.outcome_at(at + self.sweep.beams.len() - 1);
+        self.gap_before_deg(at).is_none() || !self.same(before, self.outcome_at(at))
     }
 
     fn same(&self, a: BeamOutcome, b: BeamOutcome) -> bool {
@@ -117,18 +117,19 @@ impl Finder<'_> {
     fn last_of(&self, first: usize, count: usize, max_holes: usize) -> usize {
         let (mut last, mut at) = (first, first + 1);
         let (mut sum_m, mut members) = (0.0, 0.0);
-        if let BeamOutcome::Echo(range_m) = self.heard(first) {
+        if let BeamOutcome::Echo(range_m) = self.outcome_at(first) {
             (sum_m, members) = (range_m, 1.0);
         }
-        let bridged = if matches!(self.heard(first), BeamOutcome::Echo(_)) { max_holes } else { 0 };
+        let bridged =
+            if matches!(self.outcome_at(first), BeamOutcome::Echo(_)) { max_holes } else { 0 };
         while at < first + count && at - last <= bridged + 1 && self.gap_before_deg(at).is_some() {
-            let mean = match self.heard(first) {
+            let mean = match self.outcome_at(first) {
                 BeamOutcome::Echo(_) => BeamOutcome::Echo(sum_m / members),
                 other => other,
             };
-            if self.same(mean, self.heard(at)) {
+            if self.same(mean, self.outcome_at(at)) {
                 last = at;
-                if let BeamOutcome::Echo(range_m) = self.heard(at) {
+                if let BeamOutcome::Echo(range_m) = self.outcome_at(at) {
                     (sum_m, members) = (sum_m + range_m, members + 1.0);
                 }
             }
@@ -142,17 +143,18 @@ impl Finder<'_> {
         let beam = |at: usize| beams[at % beams.len()];
         let turned = |at: usize| beam(at).azimuth_deg + if at >= beams.len() { 360.0 } else { 0.0 };
         let ranges: Vec<f64> = (first..=last)
-            .filter_map(|at| match self.heard(at) {
+            .filter_map(|at| match self.outcome_at(at) {
                 BeamOutcome::Echo(range_m) => Some(range_m),
                 _ => None,
             })
             .collect();
-        let range_m = match self.heard(first) {
+        let range_m = match self.outcome_at(first) {
             BeamOutcome::Echo(_) => quantile(ranges, 0.5),
             _ => None,
         };
         let whole_turn = last - first + 1 == beams.len() && self.sweep.closed;
-        let side = |outside: usize, gap_deg: Option<f64>| match (gap_deg, self.heard(outside)) {
+        let side = |outside: usize, gap_deg: Option<f64>| match (gap_deg, self.outcome_at(outside))
+        {
             _ if whole_turn => (RegionBorder::Cut, self.sweep.step_deg),
             (None, _) => (RegionBorder::Cut, self.sweep.step_deg),
             (Some(gap), BeamOutcome::BelowMinRange) => (RegionBorder::Covered, gap),

@@ -37,7 +37,7 @@ pub(crate) fn readings(
             })
         });
         let late_us = noise.sample_us(rng);
-        let heard = match rise.ok()? {
+        let outcome = match rise.ok()? {
             Some(EchoRise { status: PingStatus::Echo, range_m, .. }) => {
                 FiringOutcome::Echo { tof_us: 2e6 * range_m / speed_m_s + late_us }
             }
@@ -45,7 +45,7 @@ pub(crate) fn readings(
             Some(EchoRise { status: PingStatus::MinRange, .. }) => FiringOutcome::BelowMinRange,
             Some(_) => return None,
         };
-        Some(SweepFiring { azimuth_deg, outcome: heard })
+        Some(SweepFiring { azimuth_deg, outcome })
     };
     Some((0..BEAMS).filter_map(beam).collect())
 }

@@ -170,14 +170,14 @@ impl<R: Rng> Robot for SimulatedRobot<'_, R> {
         let (azimuths_deg, step_deg) = self.settings.ranger.azimuths_deg();
         let beams = azimuths_deg.zip(0..).map(|(azimuth_deg, index)| {
             let sigma_m = self.settings.range_sigma_m;
-            let heard = match point.ping(self.truth.direction_rad(azimuth_deg)) {
+            let outcome = match point.ping(self.truth.direction_rad(azimuth_deg)) {
                 Ok(prediction) => simulate_reading(&prediction, sigma_m, &mut self.rng),
                 Err(error) => {
                     self.error = Some(error);
                     BeamOutcome::NoEcho
                 }
             };
-            SweepBeam { azimuth_deg, index, outcome: heard, mount: DVec2::ZERO }
+            SweepBeam { azimuth_deg, index, outcome, mount: DVec2::ZERO }
         });
         Sweep { beams: beams.collect(), pose: self.odometry, step_deg, closed: true }
     }

@@ -155,7 +155,7 @@ fn check_lengths(browser: &Browser, plan: &str) {
     assert!(!browser.text("#legend").contains("measured length"));
 }
 
-/// One finger scrolls the page until two fingers have moved the view.
+/// A finger scrolls the page until two fingers have moved the view.
 fn check_fingers(browser: &Browser, plan: &str) {
     let [x, y] = place(browser, "#over", 0.72, 0.75);
     let (fitted, _) = view(browser, plan);

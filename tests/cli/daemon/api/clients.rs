@@ -25,7 +25,7 @@ fn status_and_watch() {
     daemon.send("POST", "/v1/start", r#"{"scans":1}"#);
     daemon.wait_for_scans(1);
     assert_eq!(daemon.stop(), Some(0));
-    // It ends with the daemon, and a script can tell that from an end that was asked for.
+    // It ends with the daemon, and its exit code differs from that of a requested end.
     let watched = watching.wait_with_output().expect("it ends");
     assert_eq!(watched.status.code(), Some(3));
     assert!(stderr(&watched).contains("--reconnect"), "{}", stderr(&watched));

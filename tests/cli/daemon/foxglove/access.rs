@@ -1,4 +1,4 @@
-//! Who may come, by the rules of the API; and what makes no sense is refused.
+//! Access of viewers by the rules of the API; invalid messages are rejected.
 
 use std::{
     io::{Read, Write},
@@ -15,7 +15,7 @@ use tungstenite::{
 };
 
 use super::{
-    super::{Daemon, ask, write_token},
+    super::{Daemon, request, write_token},
     start,
     viewer::{Came, Viewer, ask_for_viewer},
 };
@@ -47,7 +47,7 @@ fn access_rules_of_the_api() {
             "foxglove.enabled=true",
         ],
     );
-    wait_until("the address", || daemon.said().contains("http://"));
+    wait_until("the address", || daemon.messages().contains("http://"));
     let with_token = format!("/foxglove/?token={TOKEN}");
     let bearer = format!("Bearer {TOKEN}");
     for (path, headers, status) in [
@@ -67,18 +67,19 @@ fn access_rules_of_the_api() {
         ("/foxglove/", vec![PROTOCOL, ("sec-websocket-version", "8")], 400),
         ("/v1/live/records", vec![PROTOCOL, ("origin", "https://app.foxglove.dev")], 403),
     ] {
-        let asked = ask_for_viewer(daemon.connect_tcp(), path, &headers);
-        let answered = asked.as_ref().map_or_else(|refused| *refused, |_| 101);
+        let requested = ask_for_viewer(daemon.connect_tcp(), path, &headers);
+        let answered = requested.as_ref().map_or_else(|refused| *refused, |_| 101);
         assert_eq!(answered, status, "{path} {headers:?}");
     }
     // No WebSocket at all.
-    let plain = ask(daemon.connect_tcp(), "GET", "/foxglove/", &[("Host", "localhost")], "");
+    let plain =
+        send_request(daemon.connect_tcp(), "GET", "/foxglove/", &[("Host", "localhost")], "");
     assert_eq!(plain.status, 400);
     assert!(plain.json()["help"].as_str().is_some_and(|help| help.contains("ws://")));
     wait_until("they left", || daemon.status()["subscribers"]["now"] == 0);
-    let said = daemon.said();
-    assert!(!said.contains(TOKEN), "{said}");
-    assert_eq!(said.matches("add the origin to foxglove.origins").count(), 1, "{said}");
+    let printed = daemon.messages();
+    assert!(!printed.contains(TOKEN), "{printed}");
+    assert_eq!(printed.matches("add the origin to foxglove.origins").count(), 1, "{printed}");
     assert_eq!(daemon.stop(), Some(0));
 }
 
@@ -86,14 +87,15 @@ fn access_rules_of_the_api() {
 fn key_and_viewer_limit() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &[]);
-    let asked = ask_for_viewer(daemon.connect().expect("it listens"), "/foxglove/", &[PROTOCOL]);
-    assert_eq!(asked.err(), Some(404));
+    let requested =
+        ask_for_viewer(daemon.connect().expect("it listens"), "/foxglove/", &[PROTOCOL]);
+    assert_eq!(requested.err(), Some(404));
     assert_eq!(daemon.stop(), Some(0));
 
     let second = tempfile::tempdir().expect("a folder");
     let by_tcp = ["--set", "foxglove.max_clients=3", "--set", "server.listen=127.0.0.1:0"];
     let daemon = start(second.path(), &by_tcp);
-    wait_until("the address", || daemon.said().contains("http://"));
+    wait_until("the address", || daemon.messages().contains("http://"));
     let connect = || daemon.connect().expect("it listens");
     let mut viewers: Vec<_> = (0..3).map(|_| Viewer::new(connect(), "foxglove.sdk.v1")).collect();
     assert_eq!(ask_for_viewer(connect(), "/foxglove/", &[PROTOCOL]).err(), Some(503));
@@ -103,7 +105,7 @@ fn key_and_viewer_limit() {
     assert_eq!(came.iter().filter(|one| one.is_ok()).count(), 3);
     drop(viewers.pop());
     wait_until("a place", || ask_for_viewer(connect(), "/foxglove/", &[PROTOCOL]).is_ok());
-    // One that is still there is told of the end.
+    // Present viewers receive a close frame.
     let mut last = viewers.pop().expect("a viewer");
     drop((last.text(), last.text()));
     assert_eq!(daemon.stop(), Some(0));
@@ -117,7 +119,7 @@ fn connection_slots() {
     let daemon = start(folder.path(), &["--set", "server.max_clients=4"]);
     let connect = || daemon.connect().expect("it listens");
     let viewers: Vec<_> = (0..4).map(|_| Viewer::new(connect(), "foxglove.sdk.v1")).collect();
-    let full = || ask(connect(), "GET", "/v1/status", &[("Host", "localhost")], "").status;
+    let full = || send_request(connect(), "GET", "/v1/status", &[("Host", "localhost")], "").status;
     assert_eq!(full(), 503);
     drop(viewers);
     wait_until("places", || full() == 200);
@@ -161,12 +163,12 @@ fn invalid_messages() {
         (json!("?"), "invalid message"),
     ] {
         viewer.send(&order);
-        let said = refusal(&mut viewer);
-        assert!(said.contains(words), "{order:.80}: {said}");
+        let message = refusal(&mut viewer);
+        assert!(message.contains(words), "{order:.80}: {message}");
     }
     viewer.socket.send(Message::binary(vec![1, 2, 3])).expect("it takes that");
     assert!(refusal(&mut viewer).contains("only publishes"));
-    // Still subscribed, and told.
+    // Still subscribed and served.
     scan();
     while !matches!(viewer.next(), Some(Came::Message(1, _))) {}
 
@@ -174,8 +176,8 @@ fn invalid_messages() {
     let all: Vec<Value> = (0..10_000).map(|id| wish(id, id)).collect();
     let mut large = connect();
     large.send(&subscribe(all));
-    let said = refusal(&mut large);
-    assert!(said.contains("at most 65536 bytes"), "{said}");
+    let message = refusal(&mut large);
+    assert!(message.contains("at most 65536 bytes"), "{message}");
     let mut fragments = connect();
     let piece = |code: Data, last: bool| {
         Message::Frame(Frame::message(vec![b' '; 1000], OpCode::Data(code), last))
@@ -187,7 +189,7 @@ fn invalid_messages() {
         }
     }
     assert!(matches!(shown_out(&mut fragments), Some(1008) | None));
-    // A frame that says it is longer than memory, and what is no frame at all.
+    // A frame whose stated length exceeds memory, and bytes that are no frame.
     for bytes in
         [&b"\x81\xff\x7f\xff\xff\xff\xff\xff\xff\xff\0\0\0\0"[..], b"\xff\xff\xff\xff\xff\xff"]
     {

@@ -1,4 +1,4 @@
-//! What viewers cost, and what those that sleep do to others.
+//! Cost of viewers, and isolation from viewers that do not read.
 
 use std::time::{Duration, Instant};
 
@@ -33,10 +33,10 @@ fn stalled_viewer_gets_a_count() {
     let before = daemon.health()["scans"]["completed"].as_u64().expect("a count");
     // More than sockets take in between.
     daemon.wait_for_scans(before + 40);
-    let told = slow.for_a_while(Duration::from_secs(3));
+    let reported = slow.for_a_while(Duration::from_secs(3));
     let left_out = |words: &String| words.ends_with(" messages left out");
-    assert!(told.words.iter().any(left_out), "{:?}", told.words);
-    assert!(told.of("/sonar/range").count() > 0);
+    assert!(reported.words.iter().any(left_out), "{:?}", reported.words);
+    assert!(reported.of("/sonar/range").count() > 0);
     drop(slow.until("/sonar/points"));
     assert_eq!(daemon.stop(), Some(0));
 }
@@ -83,14 +83,16 @@ fn figures_of_one_viewer() {
     let (alone, alone_kb) = (share(&daemon), own_kb(daemon.id()));
     let mut viewer = viewer(&daemon);
     let watching = std::thread::spawn(move || {
-        let told = viewer.for_a_while(Duration::from_secs(45));
-        let topics: Vec<String> =
-            told.topics().map(|topic| format!("{topic} {}", told.of(topic).count())).collect();
-        let bytes: usize = told
+        let reported = viewer.for_a_while(Duration::from_secs(45));
+        let topics: Vec<String> = reported
             .topics()
-            .flat_map(|topic| told.of(topic).map(|(_, bytes)| bytes.len()).collect::<Vec<_>>())
+            .map(|topic| format!("{topic} {}", reported.of(topic).count()))
+            .collect();
+        let bytes: usize = reported
+            .topics()
+            .flat_map(|topic| reported.of(topic).map(|(_, bytes)| bytes.len()).collect::<Vec<_>>())
             .sum();
-        (topics, bytes, told.words)
+        (topics, bytes, reported.words)
     });
     wait_until("the viewer", || daemon.status()["subscribers"]["now"] == 1);
     let (watched, watched_kb) = (share(&daemon), own_kb(daemon.id()));

@@ -78,8 +78,8 @@ fn topics_and_fields_exist() {
     }
     // Points are coloured by a field of theirs, which the message itself names.
     viewer.subscribe_to_all();
-    let told = viewer.until("/sonar/points");
-    let (_, cloud) = told.of("/sonar/points").next().expect("a cloud");
+    let reported = viewer.until("/sonar/points");
+    let (_, cloud) = reported.of("/sonar/points").next().expect("a cloud");
     let plan = &layout["configById"]["3D!plan"];
     let coloured = plan["topics"].as_object().expect("topics").values();
     let by: Vec<&str> = coloured.filter_map(|topic| topic["colorField"].as_str()).collect();
@@ -88,7 +88,7 @@ fn topics_and_fields_exist() {
         let wanted = format!("{name}\0");
         assert!(cloud.windows(wanted.len()).any(|bytes| bytes == wanted.as_bytes()), "{name}");
     }
-    // Every panel stands in the arrangement once, and the other way round.
+    // Each panel is in the arrangement once, and the arrangement has no others.
     let mut placed = Vec::new();
     panels(&layout["layout"], &mut placed);
     placed.sort_unstable();

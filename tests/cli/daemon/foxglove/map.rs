@@ -1,4 +1,4 @@
-//! The map that viewers are told, and what `sonard map` makes of the log.
+//! The map for viewers, compared with `sonard map` of the log.
 
 use std::{fs, path::Path, time::Duration};
 
@@ -23,7 +23,7 @@ fn live_map_matches_the_log() {
     let daemon = start(folder.path(), &["--virtual-time", "--set", "foxglove.map=true"]);
     daemon.wait_for("ready");
     let mut viewer = Viewer::new(daemon.connect().expect("it listens"), "foxglove.sdk.v1");
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     // From place to place, so that it gets larger; from the sixth scan on each counts once.
     for (scan, x_m) in (1..).zip([0.774, 0.2, 0.5, 0.85, 0.774, 0.35]) {
         let pose = serde_json::json!({"x_m": x_m, "y_m": 0.3, "heading_deg": 10 * scan});
@@ -35,10 +35,10 @@ fn live_map_matches_the_log() {
             viewer.subscribe_to_all();
         }
         let came = viewer.until(MAP);
-        told.push(came.of(MAP).next().expect("a map").1.to_vec());
+        reported.push(came.of(MAP).next().expect("a map").1.to_vec());
     }
-    let last = told.last().expect("six").clone();
-    assert!(told.windows(2).all(|pair| pair[0] != pair[1]), "each scan changes it");
+    let last = reported.last().expect("six").clone();
+    assert!(reported.windows(2).all(|pair| pair[0] != pair[1]), "each scan changes it");
     // Who comes late gets it, too.
     let mut late = Viewer::new(daemon.connect().expect("it listens"), "foxglove.sdk.v1");
     late.wait_for_channels();
@@ -75,13 +75,14 @@ fn too_large_map() {
     viewer.subscribe_to_all();
     drop(viewer.until(MAP));
     take(2, 390.0);
-    let told = viewer.for_a_while(Duration::from_secs(2));
-    let said = |words: &String| words.contains("live map stopped") && words.contains("sonard map");
-    assert!(told.words.iter().any(said), "{:?}", told.words);
-    assert_eq!((told.of(MAP).count(), told.of("/sonar/points").count()), (0, 1));
+    let reported = viewer.for_a_while(Duration::from_secs(2));
+    let printed =
+        |words: &String| words.contains("live map stopped") && words.contains("sonard map");
+    assert!(reported.words.iter().any(printed), "{:?}", reported.words);
+    assert_eq!((reported.of(MAP).count(), reported.of("/sonar/points").count()), (0, 1));
     take(3, -390.0);
-    let told = viewer.for_a_while(Duration::from_secs(2));
-    assert!(!told.words.iter().any(said), "it is said once: {:?}", told.words);
-    assert_eq!((told.of(MAP).count(), told.of("/sonar/points").count()), (0, 1));
+    let reported = viewer.for_a_while(Duration::from_secs(2));
+    assert!(!reported.words.iter().any(printed), "reported once: {:?}", reported.words);
+    assert_eq!((reported.of(MAP).count(), reported.of("/sonar/points").count()), (0, 1));
     assert_eq!(daemon.stop(), Some(0));
 }

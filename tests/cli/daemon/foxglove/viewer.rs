@@ -14,7 +14,7 @@ use tungstenite::{
     http::HeaderValue,
 };
 
-/// One that is connected.
+/// Connected viewer.
 pub(crate) struct Viewer<S> {
     pub(crate) socket: WebSocket<S>,
     /// The sub-protocol that the server has chosen.
@@ -25,7 +25,7 @@ pub(crate) struct Viewer<S> {
     topics: BTreeMap<u32, String>,
 }
 
-/// What came from the server.
+/// Messages from the server.
 #[derive(Debug)]
 pub(crate) enum Came {
     Text(Value),
@@ -36,13 +36,13 @@ pub(crate) enum Came {
 
 /// Messages as they came.
 #[derive(Debug, Default)]
-pub(crate) struct Told {
+pub(crate) struct Received {
     messages: Vec<(String, Vec<u8>)>,
     /// Words of statuses.
     pub(crate) words: Vec<String>,
 }
 
-impl Told {
+impl Received {
     pub(crate) fn of<'a>(&'a self, topic: &'a str) -> impl Iterator<Item = (&'a str, &'a [u8])> {
         let messages = self.messages.iter().filter(move |(of, _)| of == topic);
         messages.map(|(topic, bytes)| (topic.as_str(), bytes.as_slice()))
@@ -55,7 +55,7 @@ impl Told {
     }
 }
 
-/// Asks for a viewer's WebSocket, with these headers beside; the status if that is refused.
+/// Opens a viewer's WebSocket with further headers; returns the status if it is rejected.
 pub(crate) fn ask_for_viewer<S: Read + Write>(
     stream: S,
     path: &str,
@@ -73,20 +73,21 @@ pub(crate) fn ask_for_viewer<S: Read + Write>(
 
 impl<S: Read + Write> Viewer<S> {
     pub(crate) fn new(stream: S, protocol: &str) -> Self {
-        let asked = ask_for_viewer(stream, "/foxglove/", &[("sec-websocket-protocol", protocol)]);
-        let (socket, response) = asked.expect("it may come");
+        let requested =
+            ask_for_viewer(stream, "/foxglove/", &[("sec-websocket-protocol", protocol)]);
+        let (socket, response) = requested.expect("it may come");
         let chosen = response.headers()["sec-websocket-protocol"].to_str().expect("text");
         let protocol = chosen.to_owned();
         Self { socket, protocol, channels: BTreeMap::new(), topics: BTreeMap::new() }
     }
 
-    /// What comes next; `None` when the connection broke.
+    /// Returns the next message, or `None` if the connection broke.
     pub(crate) fn next(&mut self) -> Option<Came> {
         loop {
             match self.socket.read().ok()? {
                 Message::Text(text) => {
                     let text: Value = serde_json::from_str(&text).expect("JSON");
-                    self.hear(&text);
+                    self.receive(&text);
                     return Some(Came::Text(text));
                 }
                 Message::Binary(frame) => {
@@ -102,7 +103,7 @@ impl<S: Read + Write> Viewer<S> {
         }
     }
 
-    fn hear(&mut self, text: &Value) {
+    fn receive(&mut self, text: &Value) {
         if text["op"] == "advertise" {
             for channel in text["channels"].as_array().expect("channels") {
                 let topic = channel["topic"].as_str().expect("a topic").to_owned();
@@ -146,20 +147,20 @@ impl<S: Read + Write> Viewer<S> {
     }
 
     /// All that comes until a message of this topic, with it.
-    pub(crate) fn until(&mut self, topic: &str) -> Told {
-        let mut told = Told::default();
-        while told.of(topic).next().is_none() {
+    pub(crate) fn until(&mut self, topic: &str) -> Received {
+        let mut reported = Received::default();
+        while reported.of(topic).next().is_none() {
             let came = self.next().expect("it goes on");
-            self.take(came, &mut told);
+            self.take(came, &mut reported);
         }
-        told
+        reported
     }
 
-    fn take(&self, came: Came, told: &mut Told) {
+    fn take(&self, came: Came, reported: &mut Received) {
         match came {
-            Came::Message(id, bytes) => told.messages.push((self.topics[&id].clone(), bytes)),
+            Came::Message(id, bytes) => reported.messages.push((self.topics[&id].clone(), bytes)),
             Came::Text(text) => {
-                told.words.extend(text["message"].as_str().map(str::to_owned));
+                reported.words.extend(text["message"].as_str().map(str::to_owned));
             }
             Came::End(code) => panic!("it closed with {code}"),
         }
@@ -177,18 +178,18 @@ impl<S: Read + Write> Viewer<S> {
 
 impl Viewer<std::os::unix::net::UnixStream> {
     /// All that comes within a while.
-    pub(crate) fn for_a_while(&mut self, while_: Duration) -> Told {
-        let (mut told, until) = (Told::default(), Instant::now() + while_);
+    pub(crate) fn for_a_while(&mut self, while_: Duration) -> Received {
+        let (mut reported, until) = (Received::default(), Instant::now() + while_);
         self.wait_at_most(Duration::from_millis(200));
         while Instant::now() < until {
             match self.next() {
-                Some(came) => self.take(came, &mut told),
+                Some(came) => self.take(came, &mut reported),
                 // Nothing for the moment.
                 None => continue,
             }
         }
         self.wait_at_most(Duration::from_secs(20));
-        told
+        reported
     }
 
     fn wait_at_most(&self, wait: Duration) {

@@ -1,4 +1,4 @@
-//! A broker that speaks as much MQTT 3.1.1 as is asked of it here, and does its part or does not.
+//! A broker with the part of MQTT 3.1.1 that these tests need, correct or faulty.
 
 use std::{
     io::{self, Read as _, Write as _},
@@ -8,10 +8,10 @@ use std::{
     time::Duration,
 };
 
-/// What a broker does.
+/// Behaviour of a broker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Manner {
-    /// Its part.
+    /// Correct.
     Honest,
     /// Takes everything and acknowledges nothing.
     Deaf,
@@ -23,9 +23,9 @@ pub(super) enum Manner {
     Garbled,
     /// Sends signs of life without an end.
     Noisy,
-    /// Sends messages that nobody asked for without an end.
+    /// Sends messages without a subscription, endlessly.
     Pushy,
-    /// The same, larger than any command.
+    /// As [`Self::Pushy`], with messages larger than any command.
     Bulky,
     /// Refuses user and password.
     Refusing,
@@ -37,7 +37,7 @@ pub(super) enum Manner {
     Unique,
 }
 
-/// What was published.
+/// Published message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Published {
     pub(super) topic: String,
@@ -45,7 +45,7 @@ pub(super) struct Published {
     pub(super) is_retained: bool,
 }
 
-/// What a client said of itself.
+/// Fields of a client's CONNECT packet.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct Introduction {
     pub(super) id: String,
@@ -57,7 +57,7 @@ pub(super) struct Introduction {
 }
 
 #[derive(Debug, Default)]
-pub(super) struct Heard {
+pub(super) struct ReceivedMessages {
     pub(super) introductions: Vec<Introduction>,
     /// In the order they came in, those that came twice included.
     pub(super) published: Vec<Published>,
@@ -70,7 +70,7 @@ pub(super) struct Heard {
 /// The broker, until it is dropped.
 pub(super) struct Broker {
     pub(super) port: u16,
-    heard: Arc<Mutex<Heard>>,
+    received: Arc<Mutex<ReceivedMessages>>,
     manner: Arc<Mutex<Manner>>,
 }
 
@@ -78,15 +78,15 @@ impl Broker {
     pub(super) fn start(manner: Manner) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         let port = listener.local_addr().expect("an address").port();
-        let (heard, manner) = (Arc::default(), Arc::new(Mutex::new(manner)));
-        let (ears, mood) = (Arc::clone(&heard), Arc::clone(&manner));
+        let (received, manner) = (Arc::default(), Arc::new(Mutex::new(manner)));
+        let (ears, mood) = (Arc::clone(&received), Arc::clone(&manner));
         thread::spawn(move || {
             for stream in listener.incoming().map_while(Result::ok) {
                 let (ears, manner) = (Arc::clone(&ears), *mood.lock().expect("no panic"));
                 thread::spawn(move || drop(serve(stream, manner, &ears)));
             }
         });
-        Self { port, heard, manner }
+        Self { port, received, manner }
     }
 
     /// Settings of a daemon that sends here.
@@ -98,18 +98,18 @@ impl Broker {
     /// Behaves otherwise from now on, towards new clients.
     pub(super) fn become_(&self, manner: Manner) {
         *self.manner.lock().expect("no panic") = manner;
-        for client in self.heard().clients.drain(..) {
+        for client in self.received().clients.drain(..) {
             drop(client.shutdown(Shutdown::Both));
         }
     }
 
-    pub(super) fn heard(&self) -> MutexGuard<'_, Heard> {
-        self.heard.lock().expect("no panic")
+    pub(super) fn received(&self) -> MutexGuard<'_, ReceivedMessages> {
+        self.received.lock().expect("no panic")
     }
 
-    /// What was published under a topic.
+    /// Returns the messages of a topic.
     pub(super) fn of(&self, topic: &str) -> Vec<Published> {
-        self.heard().published.iter().filter(|one| one.topic == topic).cloned().collect()
+        self.received().published.iter().filter(|one| one.topic == topic).cloned().collect()
     }
 
     /// Publishes a command to the last client.
@@ -118,29 +118,33 @@ impl Broker {
         // At least once, as number 7.
         packet.extend([0, 7]);
         packet.extend(payload);
-        let mut client = self.heard().clients.last().expect("a client").try_clone().expect("it");
+        let mut client = self.received().clients.last().expect("a client").try_clone().expect("it");
         send(&mut client, 0x32 | flags, &packet).expect("it listens");
     }
 }
 
-fn serve(mut stream: TcpStream, manner: Manner, heard: &Mutex<Heard>) -> io::Result<()> {
+fn serve(
+    mut stream: TcpStream,
+    manner: Manner,
+    received: &Mutex<ReceivedMessages>,
+) -> io::Result<()> {
     if manner == Manner::Curt {
         return Ok(());
     }
     let (_, hello) = receive(&mut stream)?;
-    let lock = || heard.lock().expect("no panic");
+    let lock = || received.lock().expect("no panic");
     lock().introductions.push(introduction(&hello));
     let code = if manner == Manner::Refusing { 4 } else { 0 };
     send(&mut stream, 0x20, &[0, code])?;
     let own = stream.try_clone()?;
     {
-        let mut heard = lock();
+        let mut received = lock();
         if manner == Manner::Unique {
-            for client in heard.clients.drain(..) {
+            for client in received.clients.drain(..) {
                 drop(client.shutdown(Shutdown::Both));
             }
         }
-        heard.clients.push(own);
+        received.clients.push(own);
     }
     match manner {
         Manner::Garbled => loop {

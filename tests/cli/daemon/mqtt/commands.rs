@@ -16,12 +16,12 @@ const REPEATED: u8 = 8;
 fn commanded(folder: &std::path::Path, broker: &Broker) -> Daemon {
     let daemon = start(folder, broker, &["--set", "mqtt.commands=true"]);
     daemon.wait_for("ready");
-    wait_until("it listens", || broker.heard().subscriptions == ["sonard/kiwi/command/+"]);
+    wait_until("it listens", || broker.received().subscriptions == ["sonard/kiwi/command/+"]);
     daemon
 }
 
-/// What is answered to a command.
-fn ask(broker: &Broker, command: &str, body: &[u8], flags: u8) -> Value {
+/// Publishes a command and returns the answer.
+fn send_request(broker: &Broker, command: &str, body: &[u8], flags: u8) -> Value {
     let answers = || broker.of("sonard/kiwi/answer");
     let before = answers().len();
     broker.publish(&format!("sonard/kiwi/command/{command}"), body, flags);
@@ -36,13 +36,13 @@ fn start_and_stop() {
     let broker = Broker::start(Manner::Honest);
     let daemon = commanded(folder.path(), &broker);
     let body = br#"{"scans": 2, "plan": {"from_deg": 0, "to_deg": 9, "step_deg": 0.9, "pings_per_stop": 1}}"#;
-    let answer = ask(&broker, "start", body, 0);
+    let answer = send_request(&broker, "start", body, 0);
     assert_eq!((&answer["command"], &answer["accepted"]), (&json!("start"), &json!(true)));
     daemon.wait_for_scans(2);
     let log = clean_log(folder.path());
     let starts: Vec<_> = log.of_type("scan_start").map(|start| &start["request"]).collect();
     assert_eq!(starts, [&answer["request"]; 2]);
-    let stopped = ask(&broker, "stop", b"", 0);
+    let stopped = send_request(&broker, "stop", b"", 0);
     assert_eq!(stopped, json!({"command": "stop", "accepted": true}));
     wait_until("it is counted", || mqtt(&daemon)["commands"] == 2);
     assert_eq!(daemon.stop(), Some(0));
@@ -54,7 +54,7 @@ fn rejected_and_repeated_commands() {
     let broker = Broker::start(Manner::Honest);
     let daemon = commanded(folder.path(), &broker);
     let huge = vec![b' '; 30_000];
-    for (command, body, flags, told) in [
+    for (command, body, flags, reported) in [
         ("start", &b"{\"scans\": 0}"[..], 0, "scans is 0"),
         ("start", b"{\"scan\": 1}", 0, "unknown field"),
         ("start", b"{\"pose\": {\"x_m\": 99, \"y_m\": 0, \"heading_deg\": 0}}", 0, "outside"),
@@ -64,10 +64,10 @@ fn rejected_and_repeated_commands() {
         ("start", b"{}", REPEATED, "repetition"),
         ("reboot", b"", 0, "no such command"),
     ] {
-        let answer = ask(&broker, command, body, flags);
+        let answer = send_request(&broker, command, body, flags);
         assert_eq!((&answer["command"], &answer["accepted"]), (&json!(command), &json!(false)));
         let error = answer["error"].as_str().expect("words");
-        assert!(error.contains(told), "{command} {told}: {error}");
+        assert!(error.contains(reported), "{command} {reported}: {error}");
         assert!(answer["help"].is_string());
     }
     assert_eq!(daemon.health()["scans"]["completed"], 0);

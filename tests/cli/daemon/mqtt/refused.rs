@@ -64,7 +64,7 @@ fn skip_sessions(max_bytes: usize) {
     let gaps = gaps(folder.path());
     let (session, status) = ("sonard/kiwi/session", "sonard/kiwi/status");
     assert!(gaps.iter().all(|gap| gap.contains(session) || gap.contains(status)), "{gaps:?}");
-    assert!(daemon.said().contains("max_packet_size"), "{}", daemon.said());
+    assert!(daemon.messages().contains("max_packet_size"), "{}", daemon.messages());
     // The events about dropped messages are published, too.
     wait_until("all records but sessions", || {
         let had = records(&broker);
@@ -123,9 +123,9 @@ fn duplicate_client_id_backs_off() {
     let daemons = folders.each_ref().map(|folder| start(folder.path(), &broker, &[]));
     // Each ends the other's connection, less and less often.
     thread::sleep(Duration::from_secs(10));
-    let early = broker.heard().introductions.len();
+    let early = broker.received().introductions.len();
     thread::sleep(Duration::from_secs(10));
-    let late = broker.heard().introductions.len() - early;
+    let late = broker.received().introductions.len() - early;
     assert!(late < early && late <= 6, "{early} connections, then {late}");
     for daemon in &daemons {
         wait_for_trouble(daemon, "another client uses the id sonard-kiwi");

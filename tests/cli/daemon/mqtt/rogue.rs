@@ -10,7 +10,7 @@ use super::{
 };
 use crate::common::wait_until;
 
-/// How long each is looked at.
+/// Duration of the observation of each broker.
 const LOOK: Duration = Duration::from_secs(6);
 
 /// Scans that a daemon completes within [`LOOK`] beside a broker, or without one.
@@ -59,9 +59,11 @@ fn attempts_back_off() {
         let broker = Broker::start(manner);
         let daemon = start(folder.path(), &broker, &[]);
         daemon.wait_for("ready");
-        wait_until("a try", || manner == Manner::Curt || !broker.heard().introductions.is_empty());
+        wait_until("a try", || {
+            manner == Manner::Curt || !broker.received().introductions.is_empty()
+        });
         std::thread::sleep(LOOK);
-        let tries = broker.heard().introductions.len();
+        let tries = broker.received().introductions.len();
         assert!(tries < 12, "{manner:?}: {tries} tries");
     }
 }
@@ -75,7 +77,7 @@ fn unacknowledged_are_resent() {
     super::take_scans(&daemon, 1);
     wait_until("some is sent", || mqtt(&daemon)["waiting"].as_u64() > Some(10));
     assert_eq!(mqtt(&daemon)["acknowledged"], 0);
-    // Longer than it may be deaf.
+    // Longer than the broker may be silent.
     std::thread::sleep(Duration::from_secs(25));
     wait_for_trouble(&daemon, "acknowledged nothing");
     broker.become_(Manner::Honest);

@@ -29,7 +29,7 @@ fn reload_of_scene_and_array() {
         daemon.get(&format!("/v1/scans/{first}/beams/0")).json()["unavailable_reason"],
         Value::Null
     );
-    // A configuration that makes no sense changes nothing and is told.
+    // An invalid configuration changes nothing and is logged.
     fs::write(&file, text("two-surface-room", "pioneer-9", 2.0)).expect("writes");
     daemon.reload();
     daemon.wait_until("the refusal", || daemon.status()["configuration"]["error"].is_string());
@@ -42,7 +42,7 @@ fn reload_of_scene_and_array() {
         .collect();
     let expected = [("mcgill-lab", "pioneer-8"), ("two-surface-room", "pioneer-7")];
     assert_eq!(sessions, expected.map(|(scene, array)| (json!(scene), json!(array))));
-    // With noise, a robot that stands reads a little otherwise each time.
+    // With noise, the readings of a stationary robot vary.
     let pings = log.pings();
     let ranges: Vec<f64> = pings
         .iter()
@@ -87,10 +87,10 @@ fn wrong_configurations() {
         (&[&["--simulate", "--set", "model.sensor=pionier"], &lab[..]].concat(), &["pioneer"]),
     ] {
         let output = run(&[&["run", "--log", &log, "--socket", &socket], arguments].concat());
-        let said = stderr(&output).replace(['\n', '\u{2502}'], " ");
-        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        let printed = stderr(&output).replace(['\n', '\u{2502}'], " ");
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {printed}");
         for part in parts {
-            assert!(said.contains(part), "{arguments:?}: {part:?} is not in: {said}");
+            assert!(printed.contains(part), "{arguments:?}: {part:?} is not in: {printed}");
         }
     }
 }
