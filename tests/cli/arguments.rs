@@ -3,7 +3,7 @@
 use std::{ffi::OsStr, fs, os::unix::ffi::OsStrExt as _};
 
 use crate::{
-    collect::printed,
+    collect::joined_stderr,
     common::{run, sonard, stderr},
 };
 

@@ -3,7 +3,7 @@
 use std::{fs, process::Stdio};
 
 use crate::{
-    collect::printed,
+    collect::joined_stderr,
     common::{run, sonard, stderr},
 };
 

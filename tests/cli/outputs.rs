@@ -16,7 +16,7 @@ use std::{
 use tempfile::TempDir;
 
 use crate::{
-    collect::printed,
+    collect::joined_stderr,
     common::{Log, mock_scan, run, sonard, stderr},
 };
 

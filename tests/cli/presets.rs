@@ -3,7 +3,7 @@
 use std::fs;
 
 use crate::{
-    collect::printed,
+    collect::joined_stderr,
     common::{run, stderr},
 };
 

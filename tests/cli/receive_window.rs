@@ -1,7 +1,7 @@
 //! Receive windows that end before the blanking, in every verb that takes scans.
 
 use crate::{
-    collect::{Case, printed},
+    collect::{Case, joined_stderr},
     common::{run, stderr},
 };
 

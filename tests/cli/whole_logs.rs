@@ -3,7 +3,7 @@
 use std::{fs, path::Path};
 
 use crate::{
-    collect::printed,
+    collect::joined_stderr,
     common::{Log, run, stderr},
 };
 

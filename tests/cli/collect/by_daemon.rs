@@ -4,7 +4,7 @@ use std::{path::Path, process::Stdio};
 
 use serde_json::json;
 
-use super::{Case, printed};
+use super::{Case, joined_stderr};
 use crate::{
     common::{Log, interrupt, run, sonard, wait_until},
     daemon::{Daemon, clean_log},

@@ -2,7 +2,7 @@
 
 use std::thread;
 
-use super::{Case, printed};
+use super::{Case, joined_stderr};
 use crate::common::{stderr, wait_until};
 
 const POSE: &str = "[poses]\nlist = [\"fig9\"]\n";

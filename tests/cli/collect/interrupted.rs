@@ -11,7 +11,7 @@ use std::{
 
 use rand::{RngExt as _, SeedableRng as _};
 
-use super::{Case, printed};
+use super::{Case, joined_stderr};
 use crate::{
     common::{MockProcess, interrupt, sonard, stderr, wait_until},
     daemon::rig::limit_files,

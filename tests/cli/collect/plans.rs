@@ -1,6 +1,6 @@
 //! Plans: complete, wrong and changed; predicted and actual durations.
 
-use super::{Case, printed};
+use super::{Case, joined_stderr};
 use crate::common::{run, stderr};
 
 #[test]

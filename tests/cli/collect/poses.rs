@@ -2,7 +2,7 @@
 
 use std::{io::Write as _, process::Stdio};
 
-use super::{Case, printed};
+use super::{Case, joined_stderr};
 use crate::common::{sonard, stderr};
 
 /// Collects with these lines on standard input.

@@ -8,7 +8,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{Daemon, Reply, read_reply, request, write_token};
+use super::{Daemon, Reply, read_reply, send_request, write_token};
 use crate::common::wait_until;
 
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";

@@ -16,7 +16,7 @@ use std::{
 use serde_json::Value;
 use sonard_test_support::fleet::{Fleet, SCANNING, until_it_listens};
 
-use super::{Daemon, request, write_token};
+use super::{Daemon, send_request, write_token};
 use crate::common::{run, sonard, stderr, wait_until};
 
 fn printed(output: &Output) -> String {

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use rustix::process::Signal;
 
-use super::{Daemon, request, write_token};
+use super::{Daemon, send_request, write_token};
 use crate::common::{run, stderr, wait_until};
 
 fn health_by_tcp(address: &str) -> Value {

@@ -9,7 +9,7 @@ use std::{
 
 use sonard::mock::Pace;
 
-use super::{Daemon, request, rig::Rig};
+use super::{Daemon, rig::Rig, send_request};
 use crate::common::{sonard, wait_until};
 
 /// Returns the notifications to `socket` up to the one that contains `wanted`.

@@ -104,7 +104,7 @@ impl Daemon {
     }
 
     pub fn messages(&self) -> String {
-        self.messages.lock().expect("no panic").clone()
+        self.printed.lock().expect("no panic").clone()
     }
 
     pub fn connect(&self) -> std::io::Result<UnixStream> {

@@ -15,7 +15,7 @@ use tungstenite::{
 };
 
 use super::{
-    super::{Daemon, request, write_token},
+    super::{Daemon, send_request, write_token},
     start,
     viewer::{Came, Viewer, ask_for_viewer},
 };
