@@ -233,7 +233,7 @@ check_api() {
   step "the API's document against the daemon"
   tests/schemathesis.sh "${CARGO_TARGET_DIR:-target}/debug/sonard" >"$work/api" 2>&1 || {
     tail -n 100 "$work/api"
-    fail "the daemon does not do what its OpenAPI document says, or the fuzzer can't be had: SCHEMATHESIS=0 leaves it out"
+    fail "the daemon contradicts its OpenAPI document, or the fuzzer can't be had: SCHEMATHESIS=0 leaves it out"
   }
 }
 
@@ -264,15 +264,15 @@ check_peer() {
 
 check_peers() {
   check_peer EXPORT_PEERS exports.sh "exports as other programs read them" \
-    "an export does not say what its log does, or the readers can't be had"
+    "an export differs from its log, or the readers can't be had"
   check_peer IMPORT_PEERS imports.sh "imports of what other programs write" \
     "an import or a scene differs from its file, or the formats' tools can't be had"
   check_peer FOXGLOVE_PEER foxglove.sh "live messages as Foxglove's library reads them" \
-    "viewers are not told what the log says, or the library can't be had"
+    "messages to viewers differ from the log, or the library can't be had"
   check_peer ROS_PEER ros.sh "messages as ROS 2 gets them" \
-    "ROS 2 is not told what the log says, or Cyclone DDS can't be had"
+    "messages to ROS 2 differ from the log, or Cyclone DDS can't be had"
   check_peer MQTT_PEER mqtt.sh "records as mosquitto gets them" \
-    "a broker does not get what the log says, or mosquitto can't be had"
+    "messages to a broker differ from the log, or mosquitto can't be had"
 }
 
 check_monitoring() {
@@ -316,7 +316,7 @@ run_tests() {
   fi | tee "$work/tests" | head -n "-$closing_lines"
 }
 
-# To nextest its configuration says that browsers run by themselves.
+# By nextest's configuration browser tests run alone.
 test_page() {
   if [ "${PAGE:-1}" = 0 ] || [ "$runner" = nextest ]; then return; fi
   step "the live page"
@@ -328,7 +328,7 @@ runner=cargo
 if cargo nextest --version >/dev/null 2>&1; then runner=nextest; fi
 # Examples are not run: Clippy looks at them.
 tested=(--lib --bins --tests)
-# What the runner says of all tests, with an empty line around it.
+# The runner's summary of all tests, between empty lines.
 closing_lines=3
 # Packages and features: the default members with default features, or everything.
 selection=()

@@ -2,7 +2,7 @@
 # What the program costs to build and to keep: seconds of processor time of a release build from nothing, and its size,
 # stripped.
 #
-#   benches/build.sh                     of this folder as it stands
+#   benches/build.sh                     of this folder
 #   benches/build.sh b4550ee HEAD HEAD:mqtt,ros     of commits, with further features after a colon
 #
 # One after the other, in folders that are thrown away; sources of dependencies are fetched before. Compare lines of one

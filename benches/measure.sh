@@ -14,7 +14,7 @@ trap cleanup EXIT
 ticks=$(getconf CLK_TCK)
 cpu() { sed 's/.*) //' "/proc/$1/stat" | awk -v ticks="$ticks" '{print ($12 + $13) / ticks}'; }
 memory() { awk -v key="$2:" '$1 == key {print $2}' "/proc/$1/status"; }
-ask() { curl -s --unix-socket "$work/s" "http://localhost$1" "${@:2}"; }
+request() { curl -s --unix-socket "$work/s" "http://localhost$1" "${@:2}"; }
 share() { # CPU of the daemon over the measured time, percent of a core
   local before after
   before=$(cpu "$daemon"); sleep "$seconds"; after=$(cpu "$daemon")
@@ -22,12 +22,12 @@ share() { # CPU of the daemon over the measured time, percent of a core
 }
 wait_for() { # a text in the answer to a path
   for _ in $(seq 600); do
-    if ask "$2" 2>/dev/null | grep -q "$1"; then return; fi
+    if request "$2" 2>/dev/null | grep -q "$1"; then return; fi
     sleep 0.05
   done
   echo "$0: waited in vain for $1" >&2; exit 1
 }
-start_daemon() { # with these options; it stands in the simple room and scans when it is asked to
+start_daemon() { # with these options; in the simple room, scanning on request
   "$sonard" mock --scene simple-room --pose fig9 --realtime --link "$work/ranger" >/dev/null &
   mock=$!
   for _ in $(seq 200); do [ -e "$work/ranger" ] && break; sleep 0.05; done
@@ -37,6 +37,6 @@ start_daemon() { # with these options; it stands in the simple room and scans wh
   wait_for '"state":"ready"' /v1/status
 }
 start_scanning() {
-  ask /v1/start --json '{"scans": 1000}' >/dev/null
+  request /v1/start --json '{"scans": 1000}' >/dev/null
   wait_for '"done":[1-9]' /v1/status
 }

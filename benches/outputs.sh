@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What a daemon costs that tells all that it can, each output with a subscriber of everything: the page's event stream, a viewer of
+# Cost of a daemon with all outputs, each with a subscriber of everything: the page's event stream, a viewer of
 # Foxglove's protocol, ROS 2 and an MQTT broker; maps with both. CPU and memory of the daemon alone, while it idles and while it
 # scans a mock in real time.
 #
@@ -36,10 +36,10 @@ sonard=$SONARD
 . benches/measure.sh
 (umask 077 && head -c 16 /dev/urandom | od -An -tx1 | tr -d ' \n' >"$work/token")
 options=(--set server.listen=127.0.0.1:8765 --set "server.token_file=$work/token")
-tells() { [[ " ${outputs[*]} " == *" $1 "* ]]; }
-if tells foxglove; then options+=(--set foxglove.enabled=true --set foxglove.map=true); fi
-if tells ros; then options+=(--set ros.enabled=true --set ros.map=true); fi
-if tells mqtt; then
+has_output() { [[ " ${outputs[*]} " == *" $1 "* ]]; }
+if has_output foxglove; then options+=(--set foxglove.enabled=true --set foxglove.map=true); fi
+if has_output ros; then options+=(--set ros.enabled=true --set ros.map=true); fi
+if has_output mqtt; then
   printf '%s\n' 'listener 1883 127.0.0.1' 'allow_anonymous true' 'user root' >"$work/broker.conf"
   mosquitto -c "$work/broker.conf" 2>/dev/null &
   others+=" $!"
@@ -49,20 +49,20 @@ if tells mqtt; then
   options+=(--set mqtt.broker=mqtt://127.0.0.1:1883)
 fi
 start_daemon "${options[@]}"
-if tells page; then
-  ask '/v1/live/records?format=sse&verdicts=true' -N >"$work/by-page" &
+if has_output page; then
+  request '/v1/live/records?format=sse&verdicts=true' -N >"$work/by-page" &
   others+=" $!"
 fi
-if tells foxglove; then
+if has_output foxglove; then
   node "$foxglove_tools/foxglove.mjs" watch 127.0.0.1:8765 "$work/token" &
   others+=" $!"
 fi
-if tells ros; then
+if has_output ros; then
   "$ros_tools/bin/python" tests/peers/ros.py "$sonard" "$work" subscribe &
   others+=" $!"
   wait_for '"subscriptions":1[0-9]' /v1/status
 fi
-if tells mqtt; then wait_for '"connected":true' /v1/status; fi
+if has_output mqtt; then wait_for '"connected":true' /v1/status; fi
 
 idle=$(share)
 start_scanning
@@ -71,7 +71,7 @@ printf 'outputs     %s\n' "${outputs[*]:-none}"
 printf 'idle        %6s %% of a core\n' "$idle"
 printf 'scanning    %6s %% of a core (400 beams a scan, 10 m, 3 echoes, predictions beside)\n' "$scanning"
 printf 'resident    %6s kB, at most %s kB\n' "$(memory "$daemon" VmRSS)" "$(memory "$daemon" VmHWM)"
-figures=$(ask /metrics)
+figures=$(request /metrics)
 count() { awk -v name="$1" '$1 == name {print $2}' <<<"$figures"; }
 for name in sonard_ros_messages_total sonard_ros_dropped_messages_total sonard_mqtt_acknowledged_records_total; do
   value=$(count "$name")

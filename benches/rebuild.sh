@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # How long a developer waits for the program after a line was changed in plots, in the command line, in the model.
 #
-#   benches/rebuild.sh                 of this folder as it stands
+#   benches/rebuild.sh                 of this folder
 #   benches/rebuild.sh 4e94ead~1 HEAD  of commits: the first is the last one whose pure part was no crates
 #
 # In folders that are thrown away; `cargo build` once from nothing, which is not counted, then after each change.

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Draws what Prometheus shows of a daemon: the room is 8 degrees colder than the daemon was told, and after two minutes it is
-# told. Takes four minutes.
+# Draws what Prometheus shows of a daemon: the room is 8 degrees colder than configured, and after two minutes the temperature is
+# corrected. Takes four minutes.
 #
 #   docs/monitoring-picture.sh SONARD PICTURE
 set -euo pipefail

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Builds the firmware and the emulator, and runs their tests. Installs what is missing where it
-# may, else says what to install. Prints the firmware's sizes.
+# may, else prints what to install. Prints the firmware's sizes.
 #
 #   firmware/test.sh          all of it
 #   firmware/test.sh build    build the firmware and print its sizes
@@ -41,7 +41,7 @@ get_tools() {
 build_firmware() {
   step "firmware: build"
   # Debian's compiler has the AVR backend and its own library's source, which a release of Rust
-  # compiles when told so. The variables of the host's build must not reach it.
+  # compiles only with this variable. The variables of the host's build must not reach it.
   (
     cd firmware
     env -u RUSTC -u RUSTFLAGS -u CARGO_TARGET_DIR -u CARGO_BUILD_TARGET_DIR \
@@ -66,7 +66,7 @@ play() {
   trap 'rm -rf "$folder"; [ -z "${emulated:-}" ] || kill "$emulated" 2>/dev/null || true' EXIT
   "$target/debug/sonard" scan --emulator --scene simple-room --pose fig9 --to-deg 36 --max-range 4 \
     --out "$folder/scan"
-  grep -q '"provenance":"emulator"' "$folder/scan/scan.jsonl" || fail "the log does not say emulator"
+  grep -q '"provenance":"emulator"' "$folder/scan/scan.jsonl" || fail "the provenance in the log is not emulator"
   SONARD_FIRMWARE=$elf "$target/debug/sonard-emulator" --scene simple-room --pose fig9 \
     --link "$folder/ranger" >/dev/null &
   emulated=$!

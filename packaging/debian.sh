@@ -7,7 +7,7 @@ new_debian() {
   tar --extract --file "$kept_debian" --directory "$1" --numeric-owner --xattrs --xattrs-include='*'
 }
 
-# What the archive gave is kept for a week under target/tools, because fetching it takes a minute; where, says `kept_debian`.
+# Downloads are kept for a week under target/tools, because fetching takes a minute; `kept_debian` prints the folder.
 keep_debian() {
   local suite packages=systemd,dbus,udev,procps,curl
   command -v mmdebstrap >/dev/null || tests/install.sh "" mmdebstrap

@@ -34,12 +34,12 @@ look_into() {
   dpkg-deb --control "$deb" "$work/control"
   grep -qx /etc/sonard/sonard.toml "$work/control/conffiles" || fail "the configuration is no conffile"
   dpkg-deb --extract "$deb" "$work/tree"
-  # The oldest C library that has every symbol which the program asks for.
+  # The oldest C library that has every symbol of the program.
   local wants has
   wants=$(objdump -T "$work/tree/usr/bin/sonard" 2>/dev/null || "aarch64-linux-gnu-objdump" -T "$work/tree/usr/bin/sonard")
   wants=$(grep -o 'GLIBC_2\.[0-9]*' <<<"$wants" | sort -Vu | tail -n 1 | sed s/GLIBC_//)
   has=$(dpkg-deb --field "$deb" Depends | grep -o 'libc6 (>= [0-9.]*)' | grep -o '[0-9.]*)' | tr -d ')')
-  printf '%s\n%s\n' "$wants" "$has" | sort -VC || fail "the program needs libc6 $wants, the package asks for $has"
+  printf '%s\n%s\n' "$wants" "$has" | sort -VC || fail "the program needs libc6 $wants, the package requires $has"
   printf '%s: %s bytes, needs libc6 %s\n' "$(basename "$deb")" "$(stat -c %s "$deb")" "$wants"
 }
 
@@ -55,8 +55,8 @@ test_arm64() {
   local run=(timeout 60 qemu-aarch64 -L /usr/aarch64-linux-gnu "$work/tree/usr/bin/sonard")
   "${run[@]}" --version
   "${run[@]}" scene check scenes/simple-room.json
-  "${run[@]}" run --config config/sonard.toml --check >/dev/null 2>"$work/said" && fail "a daemon without a port is right"
-  grep -q device.port "$work/said" || fail "$(cat "$work/said")"
+  "${run[@]}" run --config config/sonard.toml --check >/dev/null 2>"$work/output" && fail "a daemon without a port is right"
+  grep -q device.port "$work/output" || fail "$(cat "$work/output")"
 }
 
 get_tools() {
@@ -85,10 +85,10 @@ test_here() {
     fail "lintian finds fault with it"
 
   step "manual pages"
-  local page said
+  local page printed
   for page in "$work"/tree/usr/share/man/man?/*.gz; do
-    said=$(LC_ALL=C.UTF-8 MANROFFSEQ='' MANWIDTH=80 man --warnings -E UTF-8 -l -Tutf8 -Z "$page" 2>&1 >/dev/null)
-    [ -z "$said" ] || fail "$(basename "$page"): $said"
+    printed=$(LC_ALL=C.UTF-8 MANROFFSEQ='' MANWIDTH=80 man --warnings -E UTF-8 -l -Tutf8 -Z "$page" 2>&1 >/dev/null)
+    [ -z "$printed" ] || fail "$(basename "$page"): $printed"
   done
   bash -n "$work/tree/usr/share/bash-completion/completions/sonard"
 

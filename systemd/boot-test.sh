@@ -6,7 +6,7 @@
 #   systemd/boot-test.sh sonard_0.1.0-1_amd64.deb   a package, which is upgraded and removed as well
 #
 # Needs root, mounts and control groups, but no systemd on this computer. Where it can't be done it
-# says LEFT OUT and why, and ends with 0. Nothing is left behind, whatever fails.
+# prints LEFT OUT with the reason, and ends with 0. Nothing is left behind, whatever fails.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . packaging/debian.sh
@@ -85,8 +85,8 @@ FailureActionExitStatus=1
 [Service]
 Type=oneshot
 ExecStart=/root/boot-checks.sh
-StandardOutput=append:/root/said
-StandardError=append:/root/said
+StandardOutput=append:/root/output
+StandardError=append:/root/output
 UNIT
   # Wanted by a target that multi-user.target does not wait for.
   mkdir -p "$root/etc/systemd/system/default.target.wants"
@@ -94,14 +94,14 @@ UNIT
   ln -s ../boot-checks.service "$root/etc/systemd/system/default.target.wants/"
   # The journal is read from outside when something failed.
   mkdir -p "$root/var/log/journal"
-  : >"$root/root/said"
+  : >"$root/root/output"
 }
 
 boot() {
   local root=$1 hierarchy
   local options=(--directory="$root" --machine="$group" --register=no --private-network --boot
     --console=pipe --quiet --link-journal=no --capability=CAP_MKNOD)
-  # Without a systemd here nobody gives the container a unit of its own.
+  # Without systemd on the host the container has no unit of its own.
   [ -d /run/systemd/system ] || options+=(--keep-unit)
   (
     for hierarchy in "${hierarchies[@]}"; do echo "$BASHPID" >"$hierarchy/$group/cgroup.procs"; done
@@ -121,17 +121,17 @@ boot() {
   local code=0
   wait "$keeper" || code=$?
   keeper=
-  if [ "$code" != 0 ] || ! grep -qx 'all checks passed' "$root/root/said"; then
+  if [ "$code" != 0 ] || ! grep -qx 'all checks passed' "$root/root/output"; then
     report "$root"
     fail "see above (exit code $code)"
   fi
-  grep -v '^all checks passed$' "$root/root/said"
+  grep -v '^all checks passed$' "$root/root/output"
 }
 
 report() {
   tail -n 20 "$work/console" >&2
   journalctl --directory="$1/var/log/journal" --no-pager --output=short-monotonic 2>/dev/null | tail -n 120 >&2 || true
-  cat "$1/root/said" >&2
+  cat "$1/root/output" >&2
 }
 
 check_place

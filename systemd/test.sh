@@ -7,7 +7,7 @@ fail() { printf 'systemd/test.sh: %s\n' "$*" >&2; exit 1; }
 
 command -v systemd-analyze >/dev/null || ../tests/install.sh "" systemd
 
-# Verifying wants the program where the unit says it is.
+# Verification needs the program at the path in the unit.
 root=$(mktemp -d)
 trap 'rm -rf "$root"' EXIT
 for unit in sonard.service sonard@.service sonard.socket; do
@@ -15,13 +15,13 @@ for unit in sonard.service sonard@.service sonard.socket; do
 done
 cp "$root/sonard@.service" "$root/sonard@front.service"
 for unit in sonard.service sonard@front.service sonard.socket; do
-  said=$(SYSTEMD_UNIT_PATH="$root:" systemd-analyze verify --man=no "$root/$unit" 2>&1 | grep -F sonard || true)
-  [ -z "$said" ] || fail "$unit: $said"
+  printed=$(SYSTEMD_UNIT_PATH="$root:" systemd-analyze verify --man=no "$root/$unit" 2>&1 | grep -F sonard || true)
+  [ -z "$printed" ] || fail "$unit: $printed"
 done
 for unit in sonard.service sonard@front.service; do
-  systemd-analyze security --offline=yes --threshold=20 --no-pager "$root/$unit" >"$root/said" ||
-    { cat "$root/said" >&2; fail "$unit is exposed by more than 2.0"; }
-  printf '%s: %s\n' "$unit" "$(tail -n 1 "$root/said" | sed 's/^.*Overall/overall/')"
+  systemd-analyze security --offline=yes --threshold=20 --no-pager "$root/$unit" >"$root/output" ||
+    { cat "$root/output" >&2; fail "$unit is exposed by more than 2.0"; }
+  printf '%s: %s\n' "$unit" "$(tail -n 1 "$root/output" | sed 's/^.*Overall/overall/')"
 done
 
 for unit in sonard.service sonard@.service; do
@@ -47,10 +47,10 @@ differ=$(diff sonard.service sonard@.service | grep -c '^[<>]') || true
 if command -v systemd-sysusers >/dev/null; then
   mkdir -p "$root/fs/etc"
   printf 'g dialout 20\n' | cat - sonard.sysusers >"$root/sysusers.conf"
-  systemd-sysusers --root="$root/fs" "$root/sysusers.conf" >/dev/null 2>"$root/said" || fail "$(cat "$root/said")"
+  systemd-sysusers --root="$root/fs" "$root/sysusers.conf" >/dev/null 2>"$root/output" || fail "$(cat "$root/output")"
   grep -q '^sonard:' "$root/fs/etc/passwd" || fail "sysusers made no user"
 fi
 if command -v udevadm >/dev/null && udevadm verify --help >/dev/null 2>&1; then
-  udevadm verify --no-style 60-sonard.rules >/dev/null 2>"$root/said" || fail "$(cat "$root/said")"
+  udevadm verify --no-style 60-sonard.rules >/dev/null 2>"$root/output" || fail "$(cat "$root/output")"
 fi
 printf 'units, users and rule are right\n'

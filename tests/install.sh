@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Installs Debian's packages where that may be done, else says what to do.
+# Installs Debian's packages where that may be done, else prints what to do.
 #
-#   tests/install.sh WITHOUT PACKAGE...   WITHOUT says how to do without them ("leave the page out with PAGE=0"), or is empty
+#   tests/install.sh WITHOUT PACKAGE...   WITHOUT is how to do without them ("leave the page out with PAGE=0"), or is empty
 set -euo pipefail
 without=$1
 shift

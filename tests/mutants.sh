@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Changes the pure core in places spread evenly over it, one at a time, and says which changes the unit tests of the
-# changed crate do not notice (cargo-mutants; .cargo/mutants.toml says what counts as core).
+# Changes the pure core in places spread evenly over it, one at a time, and prints which changes the unit tests of the
+# changed crate do not notice (cargo-mutants; .cargo/mutants.toml defines the core).
 #
 #   tests/mutants.sh 300         every n-th change there is, 300 in all or some more
 #   tests/mutants.sh 300 7       the same from the eighth on: samples of other numbers have none in common
@@ -56,7 +56,7 @@ if [ -s "$work/left" ]; then
   if cargo nextest --version >/dev/null 2>&1; then runner=nextest; fi
   cat "$work/others" "$work/caught" "$work/timeout" "$work/unviable" >"$last/previously_caught.txt"
   began=$SECONDS
-  # Ends with 2 when some were missed and with 3 when some ran out of time, which is what is asked.
+  # Ends with 2 when some were missed and with 3 when some ran out of time, which is expected.
   code=0
   CARGO_PROFILE_DEV_DEBUG=none "$mutants" mutants --workspace --iterate --test-tool="$runner" \
     --jobs="${JOBS:-1}" --output="$out" --colors=never --no-times || code=$?

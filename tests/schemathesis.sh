@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Asks a daemon on a mock for everything that its OpenAPI document names, in ways that the document
+# Requests everything in the OpenAPI document from a daemon on a mock, in ways that the document
 # allows and in others, and holds the answers against the document (Schemathesis, from PyPI, in an
 # environment of its own under target/tools). Live streams are left out: they have no end.
 #
@@ -19,15 +19,15 @@ token=0123456789abcdef0123456789abcdef
 (umask 077 && echo "$token" >"$work/token")
 "$program" run --mock --scene simple-room --pose fig9 --log "$work/log" --socket "$work/s" \
   --set server.listen=127.0.0.1:0 --set server.token_file="$work/token" \
-  --set server.max_requests_per_s=100000 --set model.max_range_m=2 2>"$work/said" &
+  --set server.max_requests_per_s=100000 --set model.max_range_m=2 2>"$work/output" &
 daemon=$!
 address=
 for _ in $(seq 100); do
-  address=$(sed -n 's|.*listening on http://\([^ ]*\).*|\1|p' "$work/said")
+  address=$(sed -n 's|.*listening on http://\([^ ]*\).*|\1|p' "$work/output")
   if [ -n "$address" ]; then break; fi
   sleep 0.1
 done
-# There is a scan to be asked for.
+# A scan is available to requests.
 curl -sf --unix-socket "$work/s" -H 'Content-Type: application/json' -d '{"scans": 1}' \
   http://localhost/v1/start >/dev/null
 

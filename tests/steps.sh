@@ -37,7 +37,7 @@ print_times() {
   printf '%6d %6d  all\n\n' "$SECONDS" "$cpu_s"
 }
 
-# lane NAME FUNCTION...: runs the functions one after the other beside what follows. What they say is kept until `join
+# lane NAME FUNCTION...: runs the functions one after the other beside what follows. Their output is kept until `join
 # NAME`; a lane that fails ends all at the next step.
 lane() {
   local name=$1
@@ -51,18 +51,18 @@ lane() {
     step_name=
     for function in "$@"; do "$function"; done
     end_step
-  ) >"$work/said-$name" 2>&1 </dev/null &
+  ) >"$work/output-$name" 2>&1 </dev/null &
   set +m
   lanes[$name]=$!
 }
 
-# join NAME: waits for a lane, shows what it said, and ends all if a step of it failed.
+# join NAME: waits for a lane, shows its output, and ends all if a step of it failed.
 join() {
   end_step
   local name=$1 code=0 began=$SECONDS
   wait "${lanes[$name]}" || code=$?
   unset "lanes[$name]"
-  cat "$work/said-$name"
+  cat "$work/output-$name"
   sed "s/\$/ (beside)/" "$work/took-$name" >>"$took" 2>/dev/null || true
   printf '%6d %6d  waited for %s\n' $((SECONDS - began)) 0 "$name" >>"$took"
   if [ "$code" != 0 ]; then fail "$name: see above"; fi

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Makes a virtual environment of Python with the packages named, or keeps the one that has them; installs Python's
-# venv where that is missing and may be installed, else says what to do.
+# venv where that is missing and may be installed, else prints what to do.
 #
 #   tests/venv.sh FOLDER SWITCH PACKAGE...   SWITCH leaves out what it is for: PYTHON=0
 #   INTERPRETER=python3.13 tests/venv.sh ...   another than python3; 3.10 or newer

@@ -10,11 +10,11 @@ from work import DATA_SHEET, share, table
 FITTED = ("roberto-a", "roberto-b", "roberto-c", "roberto-d")
 FIT = "pose,mounting,threshold,rise,beam,skirts,pulse"
 PRIORS = ("x_m=0.03", "y_m=0.03", "heading_deg=4")
-# Each sweep says as well how sensitive its ranger was and how far ahead of the axis its face sat; how far aside is
+# Each sweep states as well how sensitive its ranger was and how far ahead of the axis its face sat; how far aside is
 # believed within 5 mm, because a heading does nearly the same.
 OF_ITS_OWN = ("--fit", "threshold,mounting", "--prior", "threshold_db=6", "--prior", "left_m=0.005")
 NEAR_M = 0.03
-# 255 stands for no echo.
+# 255 means no echo.
 REACH_M = "2.55"
 # The first robot sees itself from here on.
 BODY_M = 0.27

@@ -12,21 +12,21 @@ RIGHT_SPEED = 1.0125
 AIR = ("--temperature-c", "16.5", "--humidity-percent", "32")
 # What the panel's board gives back is not known; metal gives back nearly all.
 REFLECTANCE = {"board": 0.97, "metal": 0.99}
-# Beyond the bearings that are told nothing was heard, as far as the ranger was turned.
+# Beyond the stated bearings there was no echo, as far as the ranger was turned.
 SILENT_TO_DEG = 60
 PRIORS = ("x_m=0.005", "y_m=0.01", "heading_deg=4")
 MATERIALS = ("reflectance board=0.5", "reflectance metal=0.005")
-# Where targets stand in the scene that sweeps are fitted in, metres.
+# Positions of the targets in the scene to which sweeps are fitted, metres.
 TARGET_X_M = 5.0
 PANEL = "underlayment_26.7x122cm"
-# Width and height of the targets, metres. At what height the ranger was is not told; the middle is assumed.
+# Width and height of the targets, metres. The height of the ranger is not stated; the middle is assumed.
 TARGETS = {
     PANEL: (0.267, 1.22),
     "aluminium_38.5x58.4cm": (0.385, 0.584),
     "steel_yardstick_2.54cm_wide_86cm": (0.0254, 0.86),
     "aluminium_flashing_3.3x3.8cm": (0.033, 0.038),
 }
-# Those of metal that are fitted with the panel, and where along y they stand in the scene, metres.
+# Those of metal that are fitted with the panel, and their y in the scene, metres.
 OF_METAL = {"aluminium_38.5x58.4cm": 20.0, "steel_yardstick_2.54cm_wide_86cm": 40.0}
 # How much later than head-on the ends of a metal target's arc are taken to be read, as the panel's are, metres; and
 # how many readings at each end are.
@@ -91,7 +91,7 @@ def panel_readings(sweeps):
 
 
 def metal_readings(envelopes):
-    """Distances of metal targets as scans: what is told are the ends of their arcs, and that nothing is heard beyond."""
+    """Distances of metal targets as scans: the ends of their arcs are given, with no echo beyond."""
     rows = []
     for target, y_m in OF_METAL.items():
         for distance_m, half_deg in envelopes[target]:
@@ -162,12 +162,12 @@ def aimed_at(work, target, points, sensors):
     half_deg = dict(points)
     cells = []
     for sensor in sensors.values():
-        heard = {distance_m: before(work, distance_m, target, sensor) for distance_m in half_deg}
-        off = [arc(readings)[0] - half_deg[distance_m] for distance_m, readings in heard.items() if readings]
+        detected = {distance_m: before(work, distance_m, target, sensor) for distance_m in half_deg}
+        off = [arc(readings)[0] - half_deg[distance_m] for distance_m, readings in detected.items() if readings]
         silent = len(half_deg) - len(off)
         cells.append("%.1f° (mean %+.1f)%s" % (rms(off), mean(off), ", no echo at %d" % silent if silent else ""))
-    told = "%.0f to %.0f°" % (min(half_deg.values()), max(half_deg.values()))
-    return [target.replace("_", " "), len(points), told, *cells]
+    stated = "%.0f to %.0f°" % (min(half_deg.values()), max(half_deg.values()))
+    return [target.replace("_", " "), len(points), stated, *cells]
 
 
 def scene_of(targets, reflectance):
@@ -187,7 +187,7 @@ def before(work, distance_m, target, found):
     scene = scene_of([(target, distance_m, 0.0)], reflectance)
     half_m = 0.5 * TARGETS[target][1]
     scene["walls"][0]["z_m"] = [middle_m - half_m, middle_m + half_m]
-    # Too far below to be heard.
+    # Too far below to be detected.
     scene["floor_z_m"] = -8.0
     sensor = dict(sensor, mounting=dict(sensor["mounting"], z_m=middle_m))
     pings = work.pings(work.keep("target.json", scene), (0, 0, 0), work.keep("on-a-bench.json", sensor),

@@ -46,15 +46,15 @@ def predicted(work, corridor, sensor, roughness, engine):
     walls = [{key: wall[key] for key in ("id", "from", "to")} | {"material": "board"} for wall in corridor["walls"]]
     materials = {"board": {"reflectance": REFLECTANCE, "roughness": roughness}}
     scene = work.keep("corridor.json", {"name": "corridor", "materials": materials, "walls": walls})
-    # So far apart that none hears another's sound.
+    # So far apart that none detects another's sound.
     rangers = [{"id": "s%d" % i, "x_m": 0.0, "y_m": 0.0, "bearing_deg": turn} for i, turn in enumerate(bearings)]
     array = work.keep("eight.json", {"name": "eight", "description": "A corridor's eight sonars", "sensor": sensor, "interval_ms": 1000.0, "rangers": rangers})
     poses = work.path("corridor-poses.jsonl")
     with open(poses, "w") as file:
         for pose in corridor["poses"]:
             file.write(json.dumps({key: pose[key] for key in ("x_m", "y_m", "heading_deg")}) + "\n")
-    said = work.lines("simulate", "--scene", scene, "--poses", poses, "--array", array, "--max-range", REACH_M,
+    records = work.lines("simulate", "--scene", scene, "--poses", poses, "--array", array, "--max-range", REACH_M,
                       "--engine", engine)
-    ranges = [ping.get("range_m") for ping in said if ping["type"] == "ping"]
+    ranges = [ping.get("range_m") for ping in records if ping["type"] == "ping"]
     count = len(bearings)
     return [ranges[at:at + count] for at in range(0, len(ranges), count)]

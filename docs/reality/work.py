@@ -52,8 +52,8 @@ class Work:
 
     def pings(self, scene, pose, sensor, *options):
         """The readings that the model predicts from a pose (x, y, heading)."""
-        said = self.lines("simulate", "--scene", scene, "--pose=%f,%f,%f" % pose, "--sensor", sensor, *options)
-        return [line for line in said if line["type"] == "ping"]
+        records = self.lines("simulate", "--scene", scene, "--pose=%f,%f,%f" % pose, "--sensor", sensor, *options)
+        return [line for line in records if line["type"] == "ping"]
 
 
 def table(head, rows):

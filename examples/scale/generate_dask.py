@@ -2,7 +2,7 @@
 
     python generate_dask.py rooms.toml rooms 20
 
-Dask's workers start here, on this computer's cores (or as many as WORKERS says); on a cluster DASK_SCHEDULER_ADDRESS says where
+Dask's workers start here, on this computer's cores (or WORKERS of them); on a cluster DASK_SCHEDULER_ADDRESS is where
 its scheduler is, and the folder has to be one that all workers see. A task whose worker dies is run again by another
 one; a shard's folder is there or not there, so nothing is made twice.
 """

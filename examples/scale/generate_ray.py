@@ -2,7 +2,7 @@
 
     python generate_ray.py rooms.toml rooms 20
 
-Ray starts here, on this computer's cores (or as many workers as WORKERS says); on a cluster RAY_ADDRESS says where it is,
+Ray starts here, on this computer's cores (or with WORKERS workers); on a cluster RAY_ADDRESS is its address,
 and the folder has to be one that all nodes see. A task whose worker dies is run again; a shard's folder is there or not
 there, so nothing is made twice.
 """

@@ -58,7 +58,7 @@ run() {
   local engine=$1 workers=$2 out=$3 began ended
   shift 3
   began=$(date +%s.%N)
-  WORKERS=$workers "$@" >"$work/said" 2>&1 || { cat "$work/said" >&2; fail "$engine failed"; }
+  WORKERS=$workers "$@" >"$work/output" 2>&1 || { cat "$work/output" >&2; fail "$engine failed"; }
   ended=$(date +%s.%N)
   report "$engine" "$workers" "$out" "$began" "$ended"
 }
@@ -86,7 +86,7 @@ kill_one() {
     fi
     sleep 0.02
   done
-  fail "nobody was found at work in $1"
+  fail "no worker was found in $1"
 }
 
 # With a kill in the middle.
@@ -96,7 +96,7 @@ run_killed() {
   kill_one "$out" &
   killer=$!
   run "$engine, one killed" "$2" "$out" "${@:4}"
-  wait "$killer" || fail "$engine: nobody was killed"
+  wait "$killer" || fail "$engine: no worker was killed"
   killer=
 }
 
@@ -116,7 +116,7 @@ start_slurm() {
   if ! munge -n </dev/null >/dev/null 2>&1; then
     [ -e /etc/munge/munge.key ] || fail "munge has no key"
     chown munge: /run/munge
-    # Its own user, as its key is; where that may not write logs, --force says so and goes on.
+    # Its own user, as its key is; where that may not write logs, --force continues with a message.
     runuser -u munge -- munged --force --foreground >"$work/slurm/munged.log" 2>&1 &
     own+=($!)
     sleep 1

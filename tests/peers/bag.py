@@ -69,8 +69,8 @@ def write(folder, storage, packed=False):
         for number in range(40):
             for name in RANGERS:
                 time_s = 0.1 * number + (0.03 if name == "left" else 0)
-                said = message("sensor_msgs/msg/Range", header(time_s, name), 0, 0.5, 0.2, 4.0, range_at(name, number), 0.0)
-                put(f"/{name}/range", time_s, said)
+                reading_message = message("sensor_msgs/msg/Range", header(time_s, name), 0, 0.5, 0.2, 4.0, range_at(name, number), 0.0)
+                put(f"/{name}/range", time_s, reading_message)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@
     tests/peers/exports.sh [PROGRAM]        makes logs and exports, and calls this
 
 A recording is read by mcap with mcap-ros2-support and by rosbags: both have to read every message alike,
-field by field, and what they read has to be what the log says. A table is read by duckdb and by pyarrow: as text, and
+field by field, and their values must equal those of the log. A table is read by duckdb and by pyarrow: as text, and
 typed (Parquet), where both have to read every cell alike and as the log has it.
 """
 
@@ -45,19 +45,19 @@ def check_map(folder):
 
 def flat(record):
     """Members of members, and the two of a pair, by names of their own."""
-    told = {}
+    fields = {}
     for name, value in record.items():
         if isinstance(value, list):
             value = dict(zip(("first", "last"), value))
         if isinstance(value, dict):
-            told |= {f"{name}_{part}": one for part, one in flat(value).items()}
+            fields |= {f"{name}_{part}": one for part, one in flat(value).items()}
         else:
-            told[name] = value
-    return told
+            fields[name] = value
+    return fields
 
 
 def check_found(folder, name, marker_type):
-    """Lines or features as markers and as GeoJSON, against what the command said."""
+    """Lines or features as markers and as GeoJSON, against the output of the command."""
     records = [json.loads(line) for line in open(folder / f"{name}.jsonl", encoding="utf-8")]
     path = folder / f"{name}.geojson"
     text = json.loads(path.read_text(encoding="utf-8"))
@@ -99,10 +99,10 @@ def check_imported(path):
     for place, (ping, scan) in enumerate(pings):
         number, name = place // 2, ping["ranger"]
         assert name == list(bag.RANGERS)[place % 2]
-        said = bag.range_at(name, number)
-        status = {math.inf: "no_echo", -math.inf: "min_range"}.get(said, "echo")
+        range_m = bag.range_at(name, number)
+        status = {math.inf: "no_echo", -math.inf: "min_range"}.get(range_m, "echo")
         assert ping["status"] == status, ping
-        assert ping["range_m"] == (None if math.isinf(said) else round(said, 6)), ping
+        assert ping["range_m"] == (None if math.isinf(range_m) else round(range_m, 6)), ping
         time_s = 0.1 * number + (0.03 if name == "left" else 0)
         assert abs(nanoseconds(ping["time"]) - round((bag.START_S + time_s) * 1e9)) < 1000, ping
         pose = ping.get("pose") or scan["start"]["pose"]

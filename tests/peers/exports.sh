@@ -15,7 +15,7 @@ if [ $# = 0 ]; then cargo build --quiet --features mqtt,ros,sqlite; fi
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-made() { "$program" "$@" 2>"$work/said" >/dev/null || { cat "$work/said" >&2; exit 1; }; }
+made() { "$program" "$@" 2>"$work/output" >/dev/null || { cat "$work/output" >&2; exit 1; }; }
 # Simulated, without times, also on a course and of an array; of a mock in virtual time by ticks, and in real time by
 # its clock.
 made simulate --scene simple-room --pose fig9 -o "$work/simulated.jsonl"

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Has Foxglove's own client library take what the daemon tells viewers live, and holds every field against the daemon's log
+# Receives the daemon's live messages with Foxglove's own client library and compares every field with the daemon's log
 # of the same scans (foxglove.mjs).
 #
 #   tests/peers/foxglove.sh [PROGRAM]    without a program, it is built
@@ -18,17 +18,17 @@ trap '[ -z "$daemon" ] || kill "$daemon" 2>/dev/null || true; rm -rf "$work"' EX
 watch() {
   local name=$1
   shift
-  : >"$work/said"
+  : >"$work/output"
   "$program" run "$@" --log "$work/$name" --socket "$work/socket" --set server.listen=127.0.0.1:0 \
-    --set server.token_file="$work/token" --set foxglove.enabled=true --set foxglove.map=true 2>"$work/said" >/dev/null &
+    --set server.token_file="$work/token" --set foxglove.enabled=true --set foxglove.map=true 2>"$work/output" >/dev/null &
   daemon=$!
   for _ in $(seq 100); do
-    if grep -q 'http://' "$work/said"; then break; fi
+    if grep -q 'http://' "$work/output"; then break; fi
     sleep 0.1
   done
   local address
-  address=$(sed -n 's|.*http://\([0-9.:]*\).*|\1|p' "$work/said" | head -n 1)
-  timeout 120 node "$foxglove_tools/foxglove.mjs" "$name" "$address" "$work/token" "$work/$name" "$program" || { cat "$work/said" >&2; exit 1; }
+  address=$(sed -n 's|.*http://\([0-9.:]*\).*|\1|p' "$work/output" | head -n 1)
+  timeout 120 node "$foxglove_tools/foxglove.mjs" "$name" "$address" "$work/token" "$work/$name" "$program" || { cat "$work/output" >&2; exit 1; }
   kill "$daemon"
   wait "$daemon" || true
   daemon=

@@ -7,7 +7,7 @@
 The ranger, its pulses and all conventions are those of tests/data/fullwave/README.md, so that both files
 are read alike; the bodies are others: whole boxes, wedges, notches and a step, at which sound also bends
 twice. Helmholtz's integral equation for a rigid surface as in two_edges.py, one frequency at a time; what
-the aperture hears of a body follows by reciprocity from the field on its surface. `--check` prints
+the aperture receives of a body follows by reciprocity from the field on its surface. `--check` prints
 how far the same chain is from the table of head-on walls, and what finer panels change.
 """
 
@@ -76,7 +76,7 @@ class Chain:
         seen = [taper(directions, azimuth).max() > 0 for azimuth in AZIMUTHS_DEG]
         self.azimuths = AZIMUTHS_DEG[seen]
 
-    def heard(self, f):
+    def received(self, f):
         """By azimuth, over that of a path of 1 m, before spreading is made up for."""
         k = 2 * np.pi * f / C
         layer = lambda r, cosine: 0.25j * k * hankel(1, k * r) * cosine * self.weights
@@ -91,17 +91,17 @@ class Chain:
         return np.einsum("aj,ja->a", np.stack(gradient), field) / unit(k)
 
     def aperture(self, k, azimuth):
-        """Its field at surface and inner points, and what it hears of each surface point."""
+        """Its field at surface and inner points, and the signal received from each surface point."""
         angle = np.radians(azimuth)
         across = np.array([-np.sin(angle), np.cos(angle)])
         there = np.concatenate([self.points, self.inside])
         weight = taper(np.arctan2(there[:, 1], there[:, 0]), azimuth)
-        sent, heard = np.zeros(len(there), complex), np.zeros(len(self.points), complex)
+        sent, received = np.zeros(len(there), complex), np.zeros(len(self.points), complex)
         for u, share in APERTURE:
             r, cosine = gaps((u * across)[None, :], self.points, self.normals)
             sent += share * 0.25j * hankel(0, k * np.linalg.norm(there - u * across, axis=1))
-            heard += share * (0.25j * k * hankel(1, k * r) * cosine * self.weights)[0]
-        return sent * weight, heard * weight[: len(self.points)]
+            received += share * (0.25j * k * hankel(1, k * r) * cosine * self.weights)[0]
+        return sent * weight, received * weight[: len(self.points)]
 
 
 def inner_points(body, count, rng):
@@ -221,7 +221,7 @@ def scan(name, longest=1.3):
     what, bodies = SCENES[name]
     chain = Chain(bodies, longest * C / F0)
     print(name, len(chain.points), "points,", len(chain.azimuths), "azimuths", flush=True)
-    spectra = np.stack([chain.heard(f) for f in FREQUENCIES_HZ], axis=1)
+    spectra = np.stack([chain.received(f) for f in FREQUENCIES_HZ], axis=1)
     nearest_m = np.linalg.norm(chain.points, axis=1).min()
     times_s = np.arange(2 * nearest_m / C - 3e-4, 2 * nearest_m / C + 3.6e-3, TIME_STEP_S)
     units = compensation()
@@ -239,7 +239,7 @@ def check():
         print(distance_m, burst.max(), bias)
     for name, (_, bodies) in SCENES.items():
         for f in (F0 - 8_000, F0):
-            rough, fine = [Chain(bodies, n * C / F0).heard(f) for n in (1.3, 0.9)]
+            rough, fine = [Chain(bodies, n * C / F0).received(f) for n in (1.3, 0.9)]
             print(name, f, "finer panels change", np.abs(rough - fine).max(), "of", np.abs(fine).max())
 
 

@@ -5,7 +5,7 @@ from datetime import datetime
 
 
 class Log:
-    """What a log says, read without sonard."""
+    """Content of a log, parsed without sonard."""
 
     def __init__(self, path):
         self.session, self.scans = None, []

@@ -67,8 +67,8 @@ class Broker:
         self.start()
 
     def start(self):
-        said = open(self.folder / "said", "ab")
-        self.process = spawn(["mosquitto", "-c", self.file], stdout=said, stderr=said)
+        file = open(self.folder / "output", "ab")
+        self.process = spawn(["mosquitto", "-c", self.file], stdout=file, stderr=file)
         until("the broker", self.listens)
 
     def listens(self):
@@ -82,11 +82,11 @@ class Broker:
     def kill_once_read(self):
         """Kills it in the middle of what it is sent, with all read of what it gave out itself.
 
-        A client that notices that the broker is gone throws away what it has not read yet. The broker told the
+        A client that notices that the broker is gone throws away what it has not read yet. The broker informed the
         daemon that it has those messages, and forgets them with its memory: no later sending can bring them back.
         """
         self.process.send_signal(signal.SIGSTOP)
-        until("whoever reads from the broker", lambda: not self.unread_bytes())
+        until("the readers of the broker", lambda: not self.unread_bytes())
         self.kill()
 
     def unread_bytes(self):
@@ -112,7 +112,7 @@ class Subscriber:
         command = ["mosquitto_sub", "-h", "localhost", "-p", str(broker.port), "-i", "listener", "-c", "-q", "1"]
         command += ["-t", f"sonard/{ROBOT}/#", "-F", "%t %r %p", "-k", "5", *options]
         self.process = spawn(command, stdout=open(self.file, "wb"))
-        ready = lambda: b"listener" in (broker.folder / "said").read_bytes()
+        ready = lambda: b"listener" in (broker.folder / "output").read_bytes()
         until("the subscriber", ready)
         time.sleep(0.5)
 
@@ -145,11 +145,11 @@ class Daemon:
         command = [PROGRAM, "run", *COMMON, "--log", folder / "log", "--socket", self.socket]
         for setting in SMALL + settings:
             command += ["--set", setting]
-        self.said = open(folder / "said", "ab")
-        self.process = spawn(command, stderr=self.said)
+        self.output = open(folder / "output", "ab")
+        self.process = spawn(command, stderr=self.output)
         until("the daemon", self.socket.exists)
 
-    def ask(self, method, route, body=None):
+    def request(self, method, route, body=None):
         connection = http.client.HTTPConnection("localhost")
         connection.sock = socket.socket(socket.AF_UNIX)
         connection.sock.connect(str(self.socket))
@@ -160,7 +160,7 @@ class Daemon:
         return json.loads(answer.read())
 
     def mqtt(self):
-        return self.ask("GET", "/v1/status")["mqtt"]
+        return self.request("GET", "/v1/status")["mqtt"]
 
     def cpu_s(self):
         fields = pathlib.Path(f"/proc/{self.process.pid}/stat").read_text().rsplit(")")[-1].split()
@@ -185,7 +185,7 @@ def log(folder):
 
 
 def name(record):
-    """What tells a record from every other."""
+    """Identity of a record."""
     match record["type"]:
         case "ping":
             return record["scan"], record["index"]
@@ -196,7 +196,7 @@ def name(record):
 
 
 def compare(messages, logged):
-    """Every record came, with every field, and none that is not in the log; says how many came twice."""
+    """Checks that exactly the records of the log arrived, with every field; returns the number of repeated ones."""
     came, twice = {}, 0
     for topic, text in messages:
         if topic in ("online", "status", "answer"):
@@ -229,23 +229,23 @@ def pings(folder):
 
 
 def is_ready(daemon):
-    return daemon.ask("GET", "/v1/status")["link"]["state"] in ("ready", "scanning")
+    return daemon.request("GET", "/v1/status")["link"]["state"] in ("ready", "scanning")
 
 
 def is_idle(daemon):
-    status = daemon.ask("GET", "/v1/status")
+    status = daemon.request("GET", "/v1/status")
     return status["scan"] is None and status["scanning"]["requested"] == 0
 
 
 def take_scans(daemon, scans):
     until("the ranger", lambda: is_ready(daemon))
-    daemon.ask("POST", "/v1/start", {"scans": scans})
+    daemon.request("POST", "/v1/start", {"scans": scans})
 
 
 def wait_for_rest(daemon):
     """Until no scan is taken any more, and the broker has all."""
     until("the scans", lambda: is_idle(daemon))
-    # Longer than it takes to tell how far behind the broker is.
+    # Longer than the interval in which the broker's delay is published.
     time.sleep(2.5)
     until("all of it", lambda: daemon.mqtt()["connected"] and daemon.mqtt()["lag_bytes"] == 0)
 
@@ -290,7 +290,7 @@ def kills(work):
     subscriber.stop()
     messages = subscriber.messages()
     twice = compare(messages, logged)
-    assert "false" in online(messages)[:-1], "no last will was heard"
+    assert "false" in online(messages)[:-1], "no last will was received"
     broker.kill()
     count = sum(record["type"] == "ping" for record in logged)
     print(f"{count} readings, {len(logged)} records, {kills} kills: none lost, {twice} came twice")
@@ -303,9 +303,9 @@ def catch_up(work):
     port = free_port()
     daemon = Daemon(folder, [f"mqtt.broker=mqtt://127.0.0.1:{port}"])
     take_scans(daemon, SCANS)
-    until("readings", lambda: daemon.ask("GET", "/v1/health")["scans"]["completed"] == SCANS)
+    until("readings", lambda: daemon.request("GET", "/v1/health")["scans"]["completed"] == SCANS)
     daemon.stop()
-    assert "connection refused" in (folder / "said").read_text()
+    assert "connection refused" in (folder / "output").read_text()
     broker = Broker(work / "catch-up-broker")
     subscriber = Subscriber(folder, broker)
     settings = [f"mqtt.broker=mqtt://127.0.0.1:{broker.port}"]
@@ -359,23 +359,23 @@ def secrets(work):
                 f"mqtt.certificate_file={folder}/robot.pem", f"mqtt.key_file={folder}/robot.key",
                 "plan.to_deg=36"]
 
-    for wrong, told in [(("wrong", "ca"), "password"), (("right", "other"), "TLS")]:
+    for wrong, reason in [(("wrong", "ca"), "password"), (("right", "other"), "TLS")]:
         daemon = Daemon(folder, settings(*wrong))
-        until(told, lambda: told in (daemon.mqtt()["error"] or ""))
-        print(f"told: {daemon.mqtt()['error']}")
+        until(reason, lambda: reason in (daemon.mqtt()["error"] or ""))
+        print(f"rejected: {daemon.mqtt()['error']}")
         assert not daemon.mqtt()["connected"]
         daemon.stop()
     for host in ("localhost", "127.0.0.1"):
         daemon = Daemon(folder, settings("right", "ca", host))
         until("a connection", lambda: daemon.mqtt()["connected"])
         take_scans(daemon, 2)
-        until("scans", lambda: daemon.ask("GET", "/v1/health")["scans"]["completed"] == 2)
+        until("scans", lambda: daemon.request("GET", "/v1/health")["scans"]["completed"] == 2)
         daemon.stop()
     until("the last one", lambda: online(subscriber.messages())[-2:] == ["true", "false"])
     subscriber.stop()
     assert compare(subscriber.messages(), log(folder)) == 0
     broker.kill()
-    print("TLS, user and password: right ones are taken, wrong ones told")
+    print("TLS, user and password: right ones are accepted, wrong ones reported")
 
 
 def commands(work):
@@ -399,14 +399,14 @@ def commands(work):
     publish("start", '{"scans": 1}')
     until("an answer", lambda: len(answers()) == 2)
     assert answers()[1]["accepted"], answers()
-    until("the scan", lambda: daemon.ask("GET", "/v1/health")["scans"]["completed"] == 1)
+    until("the scan", lambda: daemon.request("GET", "/v1/health")["scans"]["completed"] == 1)
     daemon.kill()
     until("the last will", lambda: online(subscriber.messages())[-2:] == ["true", "false"])
     starts = [record for record in log(folder) if record["type"] == "scan_start"]
     assert [start["request"] for start in starts] == [answers()[1]["request"]]
     subscriber.stop()
     broker.kill()
-    print("a command is answered and carried out, one that was kept is refused; the last will is heard")
+    print("a command is answered and carried out, a retained one is rejected; the last will is received")
 
 
 with tempfile.TemporaryDirectory() as folder:

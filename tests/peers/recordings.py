@@ -71,7 +71,7 @@ def expected_range(reading, log, profile):
 
 
 def check_ranges(topics, log, profile):
-    told = 0
+    ranges = 0
     for above, reading_of in [("/sonar", lambda p: p), ("/sonar/predicted", lambda p: p.get("sim"))]:
         expected = {}
         for scan in log.scans:
@@ -91,8 +91,8 @@ def check_ranges(topics, log, profile):
                 assert near(message["min_range"], log.min_m) and near(message["max_range"], log.max_m)
                 assert (message["radiation_type"], message["variance"]) == (0, 0)
                 assert 0 < message["field_of_view"] < math.pi
-                told += 1
-    return told
+                ranges += 1
+    return ranges
 
 
 def check_scans(topics, log):
@@ -149,9 +149,9 @@ def check_points(topics, log):
         for (_, message), scan in zip(topics.get(topic, []), scans):
             assert message["header"]["frame_id"] == "map" and message["is_dense"]
             points = {point["index"]: point for point in points_of(message)}
-            heard = {p["index"]: p for p in scan["pings"] if (reading_of(p) or {}).get("status") == "echo"}
-            assert points.keys() == heard.keys(), topic
-            for index, ping in heard.items():
+            echoes = {p["index"]: p for p in scan["pings"] if (reading_of(p) or {}).get("status") == "echo"}
+            assert points.keys() == echoes.keys(), topic
+            for index, ping in echoes.items():
                 point, reading = points[index], reading_of(ping)
                 x, y, direction = place_of(ping, scan, log)
                 assert near(point["range"], reading["range_m"])
@@ -171,8 +171,8 @@ def check_transforms(topics, log):
     moving = {}
     for _, message in topics["/tf"]:
         for t in message["transforms"]:
-            told = moving.setdefault(t["child_frame_id"], {}).setdefault(tuple(t["header"]["stamp"].values()), t)
-            assert told == t, "two places at one time"
+            known = moving.setdefault(t["child_frame_id"], {}).setdefault(tuple(t["header"]["stamp"].values()), t)
+            assert known == t, "two places at one time"
     sent = {}
     for topic, messages in topics.items():
         if topic.endswith("/range") and "predicted" not in topic:
@@ -208,7 +208,7 @@ def check_paths(topics, log):
             points = [tuple(p.values()) for p in marker["points"]]
             drawn = sum(math.dist(a, b) for a, b in zip(points[::2], points[1::2]))
             assert marker["action"] == (0 if points else 2)
-            # Points stand in the log to a micrometre.
+            # The log rounds points to a micrometre.
             assert abs(drawn - lengths.get(marker["ns"], 0)) < 1e-5 * max(1, len(points)), marker["ns"]
 
 
@@ -217,8 +217,8 @@ def check_residuals(topics, log):
     for ping in (ping for scan in log.scans for ping in scan["pings"] if ping.get("residual_m") is not None):
         topic = f"/sonar/{ping['ranger']}/residual" if ping.get("ranger") else "/sonar/residual"
         expected.setdefault(topic, []).append({"data": ping["residual_m"]})
-    told = {topic: [m for _, m in of] for topic, of in topics.items() if topic.endswith("/residual")}
-    assert told == expected
+    residuals = {topic: [m for _, m in of] for topic, of in topics.items() if topic.endswith("/residual")}
+    assert residuals == expected
 
 
 def check_scene(topics, log):

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Runs a command in a network of its own, that has loopback with multicast and an interface on which nobody is; Cyclone DDS
+# Runs a command in a network of its own, that has loopback with multicast and an interface without peers; Cyclone DDS
 # within it speaks by loopback.
 #
 #   tests/peers/ros-network.sh FOLDER COMMAND...     FOLDER is for a file of settings

@@ -1,5 +1,5 @@
-# Sourced, in the root of this repository: makes sure of what hears ROS 2 without an installation of it, Cyclone DDS from PyPI under
-# target/tools, and of a network to hear it in; says where the first is (ros_tools).
+# Sourced, in the root of this repository: installs a receiver for ROS 2 without an installation of it, Cyclone DDS from PyPI under
+# target/tools, and provides a network for it; sets ros_tools to its folder.
 ros_tools=$(realpath -m "${CARGO_TARGET_DIR:-target}/tools/ros")
 tests/venv.sh "$ros_tools" ROS_PEER=0 cyclonedds==11.0.1 mcap==1.6.0 mcap-ros2-support==0.6.0
 for needed in unshare ip; do

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Holds what a daemon tells ROS 2 by DDS, as Cyclone DDS receives it, against its log and against a recording of it.
+"""Compares a daemon's messages to ROS 2, as Cyclone DDS receives them, with its log and with a recording of it.
 
     tests/peers/ros.sh [PROGRAM]        opens a network of its own without a way out, and calls this
     ros.py PROGRAM FOLDER subscribe     subscribes to everything, until it is ended
 
 Each message has to be what `sonard export` makes of the same log, field by field, as mcap-ros2-support reads that, and
-readings have to be what the log says.
+readings must equal those of the log.
 """
 
 import atexit
@@ -55,14 +55,14 @@ class Daemon:
         self.log, self.socket = WORK / name, WORK / f"{name}.sock"
         keys = [option for key, value in ros_keys.items() for option in ("--set", f"ros.{key}={value}")]
         command = [PROGRAM, "run", *options, *keys, "--log", self.log, "--socket", self.socket]
-        self.said = WORK / f"{name}.said"
-        with open(self.said, "wb") as said:
-            self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=said)
+        self.output = WORK / f"{name}.output"
+        with open(self.output, "wb") as file:
+            self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=file)
         # It ends with this program, however that ends.
         atexit.register(self.process.kill)
         until(lambda: self.socket.exists() and self.status()["link"]["state"] in ("ready", "scanning"), "a daemon")
 
-    def ask(self, method, path, body=None):
+    def request(self, method, path, body=None):
         command = ["curl", "-sS", "--unix-socket", self.socket, "-X", method, f"http://localhost{path}"]
         if body is not None:
             command += ["-H", "Content-Type: application/json", "-d", json.dumps(body)]
@@ -70,15 +70,15 @@ class Daemon:
 
     def status(self):
         try:
-            return json.loads(self.ask("GET", "/v1/status"))
+            return json.loads(self.request("GET", "/v1/status"))
         except subprocess.CalledProcessError:
             return {"link": {"state": "absent"}}
 
     def scan(self, scans):
         """Takes so many scans more."""
-        done = lambda: json.loads(self.ask("GET", "/v1/health"))["scans"]["completed"]
+        done = lambda: json.loads(self.request("GET", "/v1/health"))["scans"]["completed"]
         wanted = done() + scans
-        self.ask("POST", "/v1/start", {"scans": scans})
+        self.request("POST", "/v1/start", {"scans": scans})
         until(lambda: done() >= wanted, "scans", 60)
 
     def memory_kb(self):
@@ -94,9 +94,9 @@ class Daemon:
 
     def stop(self):
         self.process.send_signal(signal.SIGTERM)
-        assert self.process.wait(20) == 0, self.said.read_text()
-        said = self.said.read_text()
-        assert "ERROR" not in said and "panicked" not in said, said
+        assert self.process.wait(20) == 0, self.output.read_text()
+        text = self.output.read_text()
+        assert "ERROR" not in text and "panicked" not in text, text
 
 
 def until(holds, what, limit_s=20):
@@ -189,11 +189,11 @@ def nanoseconds(text):
 
 
 def hold_against_log(ranges, readings, profile, is_humble):
-    """Readings as the log has them, told by the profile's rules. Gives back the statuses of those without an echo."""
+    """Compares readings with the log by the profile's rules. Returns the statuses of those without an echo."""
     silent = collections.Counter()
-    told = [ping for ping in readings if ping["status"] in ("echo", "no_echo", "min_range")]
-    assert len(ranges) == len(told) > 0, (len(ranges), len(told))
-    for message, ping in zip(ranges, told):
+    stated = [ping for ping in readings if ping["status"] in ("echo", "no_echo", "min_range")]
+    assert len(ranges) == len(stated) > 0, (len(ranges), len(stated))
+    for message, ping in zip(ranges, stated):
         limits = {"rep117": (math.inf, -math.inf), "nav2": (message.max_range, message.min_range)}[profile]
         expected = {"echo": lambda: single(ping["range_m"]), "no_echo": lambda: limits[0], "min_range": lambda: limits[1]}
         assert message.range == expected[ping["status"]](), (message, ping)
@@ -205,7 +205,7 @@ def hold_against_log(ranges, readings, profile, is_humble):
 
 
 def compare(name, options, rangers=(), namespace="", **keys):
-    """What is told of scans: against recording and log, and what comes to those who come late."""
+    """Messages of scans, compared with recording and log, and messages to late subscribers."""
     profile, is_humble = keys.get("profile", "rep117"), keys.get("distribution") == "humble"
     range_type = ros.RangeOfHumble if is_humble else ros.Range
     types = dict(OF_SCANS)
@@ -244,7 +244,7 @@ def compare(name, options, rangers=(), namespace="", **keys):
     known_as(subscriber, namespace, is_humble, offered)
     status = daemon.status()["ros"]
     assert status["dropped"] == 0 and status["messages"] >= compared, status
-    figures = daemon.ask("GET", "/metrics")
+    figures = daemon.request("GET", "/metrics")
     assert "sonard_ros_up 1" in figures and "sonard_ros_dropped_messages_total 0" in figures, figures
     daemon.stop()
     print(f"ros: {name}: {compared} messages of {len(expected)} topics are those of the recording, "
@@ -259,7 +259,7 @@ def newest(subscriber, topic):
 
 
 def late(daemon, subscriber, types, namespace, expected):
-    """Who comes late gets what stands still, and of the rest what comes from then on."""
+    """Late subscribers receive static messages, and all others from then on."""
     comer = Subscriber(types, namespace)
     until(lambda: newest(comer, "/map") == expected.get("/map", [None])[-1], "the last map")
     comer.messages["/map"] = comer.messages["/map"][-1:]
@@ -267,7 +267,7 @@ def late(daemon, subscriber, types, namespace, expected):
     for topic in STILL:
         for mine, other in zip(comer.messages[topic], subscriber.messages[topic][-1:]):
             assert plain(mine) == plain(other)
-    # Bound to be matched by now: what stands still came to it.
+    # Matched by now, because static messages have arrived.
     until(lambda: daemon.status()["ros"]["subscriptions"] == 2 * daemon.status()["ros"]["topics"], "both")
     daemon.scan(1)
     until(lambda: len(comer.take()["/sonar/points"]) == 1, "points of a scan")
@@ -318,7 +318,7 @@ def large_map():
     subscriber = Subscriber({"/map": ros.OccupancyGrid})
     until(lambda: daemon.status()["ros"]["subscriptions"] == 1, "a subscription")
     daemon.scan(1)
-    daemon.ask("PUT", "/v1/pose", {"x_m": 28, "y_m": 10, "heading_deg": 45})
+    daemon.request("PUT", "/v1/pose", {"x_m": 28, "y_m": 10, "heading_deg": 45})
     daemon.scan(1)
     expected = maps(daemon.log)
     comer = Subscriber({"/map": ros.OccupancyGrid})
@@ -332,19 +332,19 @@ def large_map():
 
 
 def initial_pose(daemon, me, namespace):
-    """A pose in the map is followed by the next scan; others are not, and it is said why."""
+    """A pose in the map is followed by the next scan; others are rejected with a reason."""
     named = Topic(me, f"rt{namespace}/initialpose", ros.PoseWithCovarianceStamped)
     poses = DataWriter(me, named, qos=policies(False))
     until(poses.get_matched_subscriptions, "a node that listens")
     time.sleep(0.5)
 
-    def tell(frame, position, orientation):
+    def publish(frame, position, orientation):
         pose = ros.Pose(position=ros.Point(*position), orientation=ros.Quaternion(*orientation))
         header = ros.Header(stamp=ros.Time(sec=0, nanosec=0), frame_id=frame)
         whole = ros.PoseWithCovariance(pose=pose, covariance=[0.25] * 36)
         poses.write(ros.PoseWithCovarianceStamped(header=header, pose=whole))
 
-    wanted = lambda: json.loads(daemon.ask("GET", "/v1/pose"))
+    wanted = lambda: json.loads(daemon.request("GET", "/v1/pose"))
     before, status = wanted(), lambda: daemon.status()["ros"]
     refused = status()["rejected"]
     here, half = (0.5, 0.3, 0.0), math.sqrt(0.5)
@@ -355,19 +355,19 @@ def initial_pose(daemon, me, namespace):
         (("map", here, (0, 0, 0, 0)), "length 0"),
         (("map", (-7, 0, 0), (0, 0, 0, 1)), "outside the room"),
     ):
-        tell(*wrong)
+        publish(*wrong)
         refused += 1
         until(lambda: status()["rejected"] == refused, f"a refusal: {why}")
         assert "/initialpose is rejected" in status()["refusal"] and why in status()["refusal"], status()
     assert wanted() == before, wanted()
-    tell("map", here, (0, 0, half, half))
+    publish("map", here, (0, 0, half, half))
     until(lambda: wanted() != before, "a pose that is followed")
     daemon.scan(1)
     starts = [json.loads(line) for file in daemon.log.glob("*.jsonl") for line in file.read_text().splitlines()
               if '"scan_start"' in line]
     pose = max(starts, key=lambda start: start["time"])["pose"]
     assert (pose["x_m"], pose["y_m"]) == here[:2] and abs(pose["heading_deg"] - 90) < 1e-9, pose
-    assert "is rejected" in daemon.said.read_text()
+    assert "is rejected" in daemon.output.read_text()
     return refused
 
 
@@ -378,7 +378,7 @@ def commands():
     me = DomainParticipant(0)
     reply = call(me, "/kiwi", "start", 7)
     assert reply.success and reply.message.startswith("request "), reply
-    scans = lambda: json.loads(daemon.ask("GET", "/v1/health"))["scans"]
+    scans = lambda: json.loads(daemon.request("GET", "/v1/health"))["scans"]
     until(lambda: daemon.status()["scan"], "a scan")
     reply = call(me, "/kiwi", "stop", 8)
     assert reply.success and reply.message == "stopped", reply
@@ -399,7 +399,7 @@ def commands():
     until(lambda: subscriber.readers["/sonar/range"].get_matched_publications(), "a topic")
     time.sleep(1)
     assert not requests.get_matched_subscriptions(), "there is no service"
-    assert not poses.get_matched_subscriptions(), "nobody listens for poses"
+    assert not poses.get_matched_subscriptions(), "no subscription to poses"
     daemon.stop()
     print("ros: services start and stop scans and poses are followed where that is configured, and only there")
 
@@ -425,15 +425,15 @@ def stuck():
     assert 1 <= len(gaps) <= 3, gaps
     # It is given up as gone, and then everybody else gets everything again.
     have = lambda: len(me.take()["/sonar/range"])
-    said = lambda: daemon.status()["ros"]["subscriptions"]
-    until(lambda: said() <= 1, "it is given up", 60)
+    subscriptions = lambda: daemon.status()["ros"]["subscriptions"]
+    until(lambda: subscriptions() <= 1, "it is given up", 60)
     first = have()
     until(lambda: have() > first + 20, "readings for the others", 30)
     os.kill(other, signal.SIGKILL)
     os.waitpid(other, 0)
     daemon.stop()
     print(f"ros: a subscriber that stopped reading: {after['ros']['dropped']} messages left out, "
-          f"memory {before_kb} -> {after_kb} kB, told {len(gaps)} times, others go on")
+          f"memory {before_kb} -> {after_kb} kB, reported {len(gaps)} times, others go on")
 
 
 def subscribe():
@@ -456,13 +456,13 @@ def off():
     daemon = Daemon("off", ROOM, {})
     daemon.scan(1)
     assert daemon.status()["ros"] is None and daemon.ports() == [], daemon.ports()
-    assert "sonard_ros" not in daemon.ask("GET", "/metrics")
+    assert "sonard_ros" not in daemon.request("GET", "/metrics")
     daemon.stop()
     print("ros: off: no port of UDP")
 
 
 def confined():
-    """With what is the default, what is told stays on loopback; an address of another network is told there."""
+    """By default messages stay on loopback; with an address of another network they are sent there."""
     before = sent_outside()
     daemon = Daemon("confined", ROOM, {"enabled": "true"})
     until(lambda: daemon.status()["ros"]["up"], "a node")

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Has Cyclone DDS take what a daemon tells ROS 2, in a network of its own that has loopback and an interface on which
-# nobody is, and holds every field against the daemon's log (ros.py).
+# Receives a daemon's messages to ROS 2 with Cyclone DDS, in a network of its own that has loopback and an interface without
+# peers, and compares every field with the daemon's log (ros.py).
 #
 #   tests/peers/ros.sh [PROGRAM]    with the feature ros; without a program, it is built
 set -euo pipefail

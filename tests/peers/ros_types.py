@@ -1,4 +1,4 @@
-"""The types of ROS 2 that are told, as Cyclone DDS declares them: written from the definitions of ROS 2, not from sonard."""
+"""The published types of ROS 2, as Cyclone DDS declares them: written from the definitions of ROS 2, not from sonard."""
 
 from dataclasses import dataclass
 

@@ -21,17 +21,17 @@ def check_table(path, log_path):
     duck = duckdb.sql(f"SELECT count(*), sum(range_m), count(range_m), sum(sim_range_m::DOUBLE) FROM read_csv('{path}', sample_size=-1)")
     ranges = [ping["range_m"] for ping in pings if ping["range_m"] is not None]
     predicted = [ping["sim"]["range_m"] for ping in pings if ping.get("sim") and ping["sim"]["range_m"] is not None]
-    count, total, heard, of_sim = duck.fetchall()[0]
-    assert (count, heard) == (len(pings), len(ranges)) and near(float(total), sum(ranges))
+    count, total, echoes, of_sim = duck.fetchall()[0]
+    assert (count, echoes) == (len(pings), len(ranges)) and near(float(total), sum(ranges))
     assert near(float(of_sim or 0), sum(predicted))
     assert arrow.num_rows == len(rows) == len(pings)
     assert near(sum(x for x in arrow["range_m"].to_pylist() if x is not None), sum(ranges))
     for row, ping in zip(rows, pings):
         for name, value in ping.items():
             if name in row and name != "path":
-                told = " ".join(map(str, value)) if isinstance(value, list) else "" if value is None else value
+                expected_value = " ".join(map(str, value)) if isinstance(value, list) else "" if value is None else value
                 cell = row[name]
-                assert (float(cell) == told if isinstance(told, float) else cell == str(told)), (name, cell, told)
+                assert (float(cell) == expected_value if isinstance(expected_value, float) else cell == str(expected_value)), (name, cell, expected_value)
         for name, value in (ping.get("sim") or {}).items():
             if f"sim_{name}" in row and name != "path":
                 cell = row[f"sim_{name}"]
@@ -61,7 +61,7 @@ def type_of(name):
 
 
 def cells_of_log(log, scan, ping):
-    """What a row has to say, by the names of the columns: all that is not of geometry."""
+    """Expected values of a row by column name, without those of the geometry."""
     session, start, sim = log.session, scan["start"], ping.get("sim") or {}
     pose = ping.get("pose") or start["pose"]
     air = start.get("air") or session["air"]
@@ -123,16 +123,16 @@ def check_typed_table(path, log_path):
             agree = cell // 1000 == other[name] // 1000 if name in TIME and cell is not None else cell == other[name]
             assert agree, (name, cell, other[name])
             if name in DERIVED:
-                told = line[name]
-                assert (cell or "") == told if name in TEXT else cell == (float(told) if told else None), (name, cell, told)
+                value = line[name]
+                assert (cell or "") == value if name in TEXT else cell == (float(value) if value else None), (name, cell, value)
             else:
                 assert cell == expected.get(name), (name, cell, expected.get(name))
-    told = {key.decode(): value.decode() for key, value in file.metadata.metadata.items()}
+    metadata = {key.decode(): value.decode() for key, value in file.metadata.metadata.items()}
     by_duckdb = db.sql(f"SELECT key, value FROM parquet_kv_metadata('{path}')").fetchall()
-    assert {bytes(key).decode(): bytes(value).decode() for key, value in by_duckdb} == told
-    session = json.loads(told["sonard.session.1"])
+    assert {bytes(key).decode(): bytes(value).decode() for key, value in by_duckdb} == metadata
+    session = json.loads(metadata["sonard.session.1"])
     scene = log.session.get("scene_text")
     assert session == {key: value for key, value in log.session.items() if key not in ("type", "scene_text")}
-    assert scene is None or told[f"sonard.scene.{session['scene']['sha256']}"] == scene
+    assert scene is None or metadata[f"sonard.scene.{session['scene']['sha256']}"] == scene
     size = path.stat().st_size / len(rows)
     print(f"{path}: {len(rows)} rows, {size:.0f} bytes each, read alike by both")

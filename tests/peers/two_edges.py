@@ -80,9 +80,9 @@ def fields(bodies, source, receivers, longest_m):
     incident = lambda at: 0.25j * hankel1(0, K * np.linalg.norm(at - source, axis=1))
     known = np.concatenate([incident(points), incident(inside)])
     field, *_ = lstsq(matrix, known, lapack_driver="gelsy")
-    heard = incident(receivers) + double_layer(receivers, points, normals, weights) @ field
+    received = incident(receivers) + double_layer(receivers, points, normals, weights) @ field
     unit = 0.25j * np.sqrt(2 / (np.pi * K)) * np.exp(-0.25j * np.pi)
-    return np.conj(heard / unit)
+    return np.conj(received / unit)
 
 
 def arc(center, radius_m, from_deg, to_deg, count):
