@@ -52,9 +52,11 @@ pub fn read(
         library,
         found: Surfaces::default(),
         notes: Vec::new(),
+        further_notes: 0,
         file: None,
         depth: 0,
         includes: 0,
+        included_bytes: 0,
         nesting: 0,
         at_other_heights: 0,
     };
@@ -62,6 +64,9 @@ pub fn read(
     if world.at_other_heights > 0 {
         let (count, cut_z_m) = (world.at_other_heights, options.cut_z_m);
         world.notes.push(format!("{count} shapes are above or below the slice at {cut_z_m} m"));
+    }
+    if world.further_notes > 0 {
+        world.notes.push(format!("{} further notes", world.further_notes));
     }
     Ok(FloorPlan { surfaces: world.found, notes: world.notes })
 }
@@ -73,11 +78,15 @@ struct World<'a> {
     found: Surfaces,
     /// Notes on ignored objects.
     notes: Vec<String>,
+    /// Number of notes beyond [`MAX_NOTES`].
+    further_notes: u64,
     /// File that is included; `None` for the world itself.
     file: Option<PathBuf>,
     /// Nesting depth and number of included files.
     depth: usize,
     includes: usize,
+    /// Total size of the included files, with repetitions.
+    included_bytes: usize,
     /// Nesting depth of models.
     nesting: usize,
     /// Number of shapes above or below the slice.
@@ -91,7 +100,19 @@ struct Body<'n> {
     scale: DVec3,
 }
 
+/// Maximum number of notes.
+const MAX_NOTES: usize = 100;
+
 impl World<'_> {
+    /// Adds a note, once; beyond [`MAX_NOTES`] notes are counted.
+    fn note(&mut self, note: String) {
+        if self.notes.len() == MAX_NOTES {
+            self.further_notes += 1;
+        } else if !self.notes.contains(&note) {
+            self.notes.push(note);
+        }
+    }
+
     /// Adds the worlds of a file, and the models outside them.
     fn add_worlds(&mut self, root: Node) -> Added {
         let mut worlds = 0;
@@ -100,7 +121,7 @@ impl World<'_> {
                 worlds += 1;
                 if worlds > 1 {
                     let name = child.attribute("name").unwrap_or("without a name");
-                    self.notes.push(format!("ignored: world `{name}`, which is not the first"));
+                    self.note(format!("ignored: world `{name}`, which is not the first"));
                     continue;
                 }
                 let states = child.children().filter(|child| child.has_tag_name("state"));
@@ -125,7 +146,7 @@ impl World<'_> {
                 "include" => self.include(child, scope, state)?,
                 kind @ ("population" | "actor") => {
                     let name = child.attribute("name").unwrap_or("without a name");
-                    self.notes.push(format!("ignored: {kind} `{name}`"));
+                    self.note(format!("ignored: {kind} `{name}`"));
                 }
                 _ => {}
             }
@@ -147,7 +168,7 @@ impl World<'_> {
         let state = state.of_model(name);
         let scale = scope.scale * state.scale(self)?;
         if self.nesting == MAX_NESTING {
-            self.notes.push(format!("ignored: model `{name}`, which is nested too deeply"));
+            self.note(format!("ignored: model `{name}`, which is nested too deeply"));
             return Ok(());
         }
         let inner = Scope { element: model, frame, scale, name, outer: Some(scope) };
@@ -166,7 +187,7 @@ impl World<'_> {
         state: &State<'_, 'n>,
     ) -> Result<Option<DAffine3>, PlanError> {
         if model.attribute("placement_frame").is_some_and(|frame| !frame.is_empty()) {
-            self.notes.push(format!("ignored: model `{name}`, which uses placement_frame"));
+            self.note(format!("ignored: model `{name}`, which uses placement_frame"));
             return Ok(None);
         }
         match state.of_model(name).pose(self)? {
@@ -211,7 +232,7 @@ impl World<'_> {
             Ok(frame) => Ok(Some(frame)),
             Err(missing) => {
                 self.found.count_ignored("poses relative to missing frames");
-                self.notes.push(format!(
+                self.note(format!(
                     "ignored: {} of `{name}`, whose pose is relative to `{missing}`",
                     element.tag_name().name()
                 ));

@@ -1,5 +1,7 @@
 //! Floor plans from file to walls.
 
+use std::path::{Path, PathBuf};
+
 use sonard_model::scene::Scene;
 
 use crate::{
@@ -195,4 +197,40 @@ fn large_files_are_rejected() {
         let error = plan.expect_err("too large");
         assert!(error.to_string().contains("larger than 16 MB"), "{error}");
     }
+}
+
+/// Library in which every model includes itself repeatedly.
+struct Recursive {
+    padding: usize,
+}
+
+impl Library for Recursive {
+    fn model(&self, uri: &str, _: Option<&Path>) -> Option<(PathBuf, Vec<u8>)> {
+        let include = "<include><uri>model://again</uri></include>".repeat(4);
+        let padding = " ".repeat(self.padding);
+        let model = format!("<sdf version='1.6'><model name='m'>{include}{padding}</model></sdf>");
+        Some((PathBuf::from(uri), model.into_bytes()))
+    }
+}
+
+#[test]
+fn recursive_models_are_bounded() {
+    let world = "<sdf version='1.6'><world name='w'><include><uri>model://again</uri></include></world></sdf>";
+    for (padding, limit) in [(0, "8 nested files"), (1 << 20, "64 MB of included files")] {
+        let plan =
+            sdf::read(world.as_bytes(), &SdfOptions { cut_z_m: 0.2 }, &Recursive { padding });
+        let notes = plan.expect("a world").notes;
+        let expected = format!("ignored: the model `model://again`: more than {limit}");
+        assert!(notes.contains(&expected), "{padding}: {notes:?}");
+    }
+}
+
+#[test]
+fn notes_are_distinct_and_bounded() {
+    let include = |name: usize| format!("<include><uri>model://m{name}</uri></include>");
+    let includes: String = (0..500).chain(0..500).map(include).collect();
+    let world = format!("<sdf version='1.6'><world name='w'>{includes}</world></sdf>");
+    let plan = sdf::read(world.as_bytes(), &SdfOptions { cut_z_m: 0.2 }, &sdf::NoLibrary);
+    let notes = plan.expect("a world").notes;
+    assert_eq!((notes.len(), notes.last().map(String::as_str)), (101, Some("900 further notes")));
 }

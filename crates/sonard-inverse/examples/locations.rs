@@ -71,7 +71,8 @@ fn located_in(name: &str, count: u64, seed: u64, beams: usize) {
         let modes = locate(&world, &atlas, &sweep).unwrap_or_default();
         times.push(cpu_s() - began);
         let found = modes.iter().find(|mode| is_there(mode, &pose, beams));
-        let is_reported = found.is_some() || modes.iter().any(|mode| is_reported(mode, &pose, beams));
+        let is_reported =
+            found.is_some() || modes.iter().any(|mode| is_reported(mode, &pose, beams));
         reported += u32::from(is_reported);
         right += u32::from(found.is_some());
         sure += u32::from(found.is_some_and(|mode| mode.probability > 0.5));

@@ -8,7 +8,7 @@ use std::{
 use roxmltree::Node;
 
 use super::{Added, Scope, World, child, state::State};
-use crate::xml;
+use crate::{MAX_FILE_BYTES, xml};
 
 /// Source of the models that a world includes.
 pub trait Library {
@@ -27,9 +27,11 @@ impl Library for NoLibrary {
     }
 }
 
-/// Maximum nesting depth and number of included files.
+/// Maximum nesting depth, number and total size of included files, with repetitions: a few files
+/// that include each other would take hours otherwise.
 const MAX_DEPTH: usize = 8;
 const MAX_INCLUDES: usize = 10_000;
+const MAX_INCLUDED_BYTES: usize = 4 * MAX_FILE_BYTES;
 
 impl World<'_> {
     /// Adds the model of an `include`, or notes that it is not available.
@@ -41,11 +43,17 @@ impl World<'_> {
     ) -> Added {
         let text = |name: &str| child(include, name).and_then(|node| node.text()).map(str::trim);
         let uri = text("uri").unwrap_or_default();
-        if self.depth == MAX_DEPTH || self.includes == MAX_INCLUDES {
-            let what = format!(
-                "ignored: the model `{uri}`: more than {MAX_DEPTH} nested or {MAX_INCLUDES} included files"
-            );
-            return self.ignore(what);
+        let limit = if self.depth == MAX_DEPTH {
+            Some(format!("{MAX_DEPTH} nested files"))
+        } else if self.includes == MAX_INCLUDES {
+            Some(format!("{MAX_INCLUDES} included files"))
+        } else if self.included_bytes > MAX_INCLUDED_BYTES {
+            Some(format!("{} MB of included files", MAX_INCLUDED_BYTES >> 20))
+        } else {
+            None
+        };
+        if let Some(limit) = limit {
+            return self.ignore(format!("ignored: the model `{uri}`: more than {limit}"));
         }
         self.includes += 1;
         let Some((path, bytes)) = self.library.model(uri, self.file.as_deref()) else {
@@ -53,6 +61,7 @@ impl World<'_> {
                 "ignored: the model `{uri}`; put its folder next to the world to include it"
             ));
         };
+        self.included_bytes += bytes.len();
         let ignored =
             |why: &dyn Display| format!("ignored: the model `{uri}`: {}: {why}", path.display());
         let file = match xml::text(&bytes, "") {
@@ -94,7 +103,7 @@ impl World<'_> {
 
     fn ignore(&mut self, note: String) -> Added {
         self.found.count_ignored("models from elsewhere (include)");
-        self.notes.push(note);
+        self.note(note);
         Ok(())
     }
 }

@@ -20,7 +20,7 @@ impl World<'_> {
                     let [radius_m] = self.numbers_of(shape, "radius")?;
                     let [length_m] = self.numbers_of(shape, "length")?;
                     if (scale.x - scale.y).abs() > 1e-6 * scale.x.abs() {
-                        self.notes.push(format!(
+                        self.note(format!(
                             "ignored: a cylinder of `{name}` that is scaled to an oval"
                         ));
                         continue;
@@ -32,7 +32,7 @@ impl World<'_> {
                 "empty" => {}
                 kind => {
                     self.found.count_ignored("meshes, spheres and other shapes");
-                    self.notes.push(format!("ignored: {kind} of `{name}`"));
+                    self.note(format!("ignored: {kind} of `{name}`"));
                 }
             }
         }
@@ -46,7 +46,7 @@ impl World<'_> {
             None => DVec3::Z,
         };
         if (frame.matrix3 * normal.normalize_or(DVec3::Z)).z.abs() < UPRIGHT {
-            self.notes.push(format!("ignored: a plane of `{name}` that is not horizontal"));
+            self.note(format!("ignored: a plane of `{name}` that is not horizontal"));
         }
         Ok(())
     }
@@ -95,7 +95,7 @@ impl World<'_> {
 
     fn ignore_tilted(&mut self, name: &str) {
         self.found.count_ignored(TILTED);
-        self.notes.push(format!("ignored: a tilted object of `{name}`"));
+        self.note(format!("ignored: a tilted object of `{name}`"));
     }
 
     /// Returns `true` if the slice intersects a body with this centre height and half-height,
