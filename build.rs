@@ -6,7 +6,7 @@ use std::{env, path::Path, process::Command};
 const SOURCES: [&str; 5] = ["src", "crates", "firmware-protocol", "Cargo.toml", "Cargo.lock"];
 
 /// Features that `sonard --version` states.
-const FEATURES: [&str; 5] = ["daemon", "pi", "mqtt", "ros", "sqlite"];
+const FEATURES: [&str; 6] = ["daemon", "pi", "lz4", "mqtt", "ros", "sqlite"];
 
 fn main() {
     println!("cargo:rerun-if-env-changed=SONARD_COMMIT");

@@ -23,6 +23,7 @@
 #   MQTT_PEER=0          without mosquitto (Debian packages)
 #   PROMTOOL=0           without promtool (Debian package prometheus)
 #   FAKETIME=0           without the clock that is set (libfaketime)
+#   PLATFORMS=0          without Clippy for macOS and Windows
 #   BOOT=0               without units under a booted systemd (systemd/boot-test.sh)
 #   PACKAGE=1            with the Debian package around the tests' program: build, installation, upgrade, removal;
 #                        PACKAGE=release with the release build, PACKAGE=all also for a Raspberry Pi
@@ -79,6 +80,15 @@ check_text() {
   cargo fmt --manifest-path web/wasm/Cargo.toml -- --check
   step "clippy, warnings denied"
   cargo clippy "${selection[@]}" --all-targets --quiet -- -D warnings
+}
+
+check_platforms() {
+  if [ "${PLATFORMS:-1}" = 0 ]; then
+    step "other systems: LEFT OUT, because PLATFORMS=0"
+    return
+  fi
+  step "Clippy for macOS and Windows"
+  gently tests/platforms.sh
 }
 
 check_pure_part() {
@@ -332,7 +342,7 @@ tested=(--lib --bins --tests)
 closing_lines=3
 # Packages and features: the default members with default features, or everything.
 selection=()
-if [ "$tier" = all ]; then selection=(--workspace --features sonard/mqtt,sonard/ros,sonard/sqlite); fi
+if [ "$tier" = all ]; then selection=(--workspace --features sonard/full); fi
 # A change is judged by the same random cases as the one before it.
 export PROPTEST_RNG_SEED=${PROPTEST_RNG_SEED:-2026}
 export SONARD_FIRMWARE=${SONARD_FIRMWARE:-$PWD/firmware/target/avr-none/release/sonard-firmware.elf}
@@ -368,7 +378,7 @@ default)
 all)
   check_tools
   lane "tools of others" prepare_browser get_package_tools
-  lane "apart from the workspace" build_playground fuzz build_python
+  lane "apart from the workspace" build_playground fuzz build_python check_platforms
   build_firmware
   check_text
   check_pure_part

@@ -31,14 +31,14 @@ install rustc-web cargo-web libstd-rust-web-dev:arm64 gcc-aarch64-linux-gnu libc
       gcc-aarch64-linux-gnu libc6-dev-arm64-cross >&2
   fi
   PATH=/usr/bin:/bin CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc \
-    /usr/bin/cargo build --release --quiet --features mqtt,ros,sqlite --bin sonard --target aarch64-unknown-linux-gnu
+    /usr/bin/cargo build --release --quiet --features full --bin sonard --target aarch64-unknown-linux-gnu
 }
 
 # prepare PROFILE: builds the program and has it write pages and completions, which are the same everywhere.
 prepare() {
   local folder=$1
   case $1 in
-  release) cargo build --release --quiet --features mqtt,ros,sqlite --bin sonard ;;
+  release) cargo build --release --quiet --features full --bin sonard ;;
   dev)
     # As tests build it, with the features of the other one.
     folder=debug

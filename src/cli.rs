@@ -21,10 +21,14 @@ mod array;
 mod board;
 mod build;
 mod calibrate;
+#[cfg(feature = "daemon")]
 mod collect;
 mod compare;
 mod completions;
+#[cfg(feature = "daemon")]
 mod daemon;
+mod diagnostic;
+#[cfg(feature = "daemon")]
 mod doctor;
 mod export;
 mod failure;
@@ -34,17 +38,24 @@ mod groups;
 mod help;
 mod import;
 mod interpret;
+#[cfg(feature = "daemon")]
+mod interruptible;
 mod lines;
 mod locate;
 mod log;
 mod logs;
 mod map;
 mod map_file;
+#[cfg(feature = "daemon")]
 mod mock;
+#[cfg(feature = "daemon")]
 mod mock_world;
 mod numbers;
+#[cfg(feature = "daemon")]
+mod online;
 mod options;
 mod output;
+#[cfg(feature = "daemon")]
 mod package_files;
 mod paths;
 mod picture;
@@ -55,34 +66,45 @@ mod predictor;
 mod preset;
 mod prior;
 mod progress;
+#[cfg(feature = "daemon")]
+mod prompt;
+#[cfg(feature = "daemon")]
 mod report;
+#[cfg(feature = "daemon")]
 mod run;
 mod runtime;
+#[cfg(feature = "daemon")]
 mod scan;
 mod scene;
 mod scene_file;
 mod simulate;
+#[cfg(feature = "daemon")]
 mod socket;
+#[cfg(feature = "daemon")]
 mod status;
 mod suggest;
 mod sweeps;
 mod table;
 mod terminal;
+#[cfg(feature = "daemon")]
 mod tour;
 mod trace;
+#[cfg(feature = "daemon")]
 mod watch;
 mod what_if;
 mod worlds;
 
 use build::LONG_VERSION;
+pub use diagnostic::Diagnostic;
 pub use failure::{Failure, Outcome};
+#[cfg(feature = "daemon")]
 pub use run::EmbeddedDaemon;
 
-use std::{process::ExitCode, sync::Arc};
+use std::process::ExitCode;
 
 use clap::{Command, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
-use crate::messages;
+use crate::{messages, platform};
 
 /// Drive an ultrasonic ranger on a stepper, and predict its readings
 #[derive(Debug, Parser)]
@@ -98,32 +120,9 @@ an output that can't be written), 3 device, link or disk error.";
 
 #[derive(Debug, Subcommand)]
 enum Verb {
-    /// Run the first commands of the documentation, step by step
-    #[command(long_about = tour::ABOUT)]
-    Tour(tour::Args),
-    /// Take one or more scans and log each reading with the model's prediction
-    #[command(long_about = scan::ABOUT)]
-    Scan(scan::Args),
-    /// Take scans by a plan, over days: poses, repeats, checks, a report
-    #[command(long_about = collect::ABOUT)]
-    Collect(Box<collect::Args>),
-    /// Run the daemon: scan continuously, keep logs, serve the API
-    #[command(long_about = run::ABOUT)]
-    Run(Box<run::Args>),
-    /// Show the state of running daemons
-    Status(status::Args),
-    /// Stream live records
-    Watch(watch::Args),
-    /// Run a mock ranger on a pty, with echoes from the model
-    #[command(long_about = mock::ABOUT)]
-    Mock(mock::Args),
-    /// Drive the ranger from Raspberry Pi GPIO
-    #[cfg(feature = "pi")]
-    #[command(long_about = board::ABOUT)]
-    Board(board::Args),
-    /// Diagnose a ranger: port, firmware, motor, echo
-    #[command(long_about = doctor::ABOUT)]
-    Doctor(doctor::Args),
+    #[cfg(feature = "daemon")]
+    #[command(flatten)]
+    Online(Box<online::Verb>),
     /// Predict a scan with the model alone
     #[command(long_about = simulate::ABOUT)]
     Simulate(simulate::Args),
@@ -168,15 +167,9 @@ enum Verb {
     /// Check, repair or show a log
     #[command(subcommand)]
     Log(log::Verb),
-    /// Collect what a bug report needs in one archive
-    #[command(long_about = report::ABOUT)]
-    Report(report::Args),
     /// Print a script that completes the command line in a shell
     #[command(long_about = completions::ABOUT)]
     Completions(completions::Args),
-    /// Write manual pages and shell completions, for packages
-    #[command(hide = true)]
-    PackageFiles(package_files::Args),
     /// Check, draw or make a scene file (from a map or drawing), list or print the shipped ones
     #[command(subcommand)]
     Scene(scene::Verb),
@@ -186,6 +179,17 @@ enum Verb {
     /// List or print the shipped arrays of rangers
     #[command(subcommand)]
     Array(preset::ArrayVerb),
+}
+
+impl Verb {
+    /// Returns `true` if the verb logs its own messages, as the daemon does.
+    fn logs_messages(&self) -> bool {
+        #[cfg(feature = "daemon")]
+        if let Self::Online(verb) = self {
+            return matches!(**verb, online::Verb::Run(_));
+        }
+        false
+    }
 }
 
 /// Builds the command line for help texts as wide as the terminal.
@@ -221,8 +225,7 @@ fn command_line_within(columns: usize) -> Command {
 pub fn main() -> ExitCode {
     completions::serve_requests();
     build::declare();
-    ignore_file_size_signal();
-    failure::print_whole_lines();
+    platform::ignore_file_size_signal();
     let mut command = command_line();
     let arguments: Vec<_> = std::env::args_os().collect();
     let matches = command.try_get_matches_from_mut(&arguments).unwrap_or_else(|error| {
@@ -234,20 +237,16 @@ pub fn main() -> ExitCode {
     }
     let cli =
         Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.format(&mut command).exit());
-    // The daemon logs its own messages.
-    if !matches!(cli.verb, Verb::Run(_)) {
+    if !cli.verb.logs_messages() {
         messages::warn_on_stderr();
     }
-    let outcome = match cli.verb {
-        Verb::Scan(args) => scan::run(&args),
-        Verb::Collect(args) => collect::run(&args),
-        Verb::Run(args) => run::run(*args),
-        Verb::Status(args) => status::run(&args),
-        Verb::Watch(args) => watch::run(&args),
-        Verb::Mock(args) => mock::run(&args),
-        #[cfg(feature = "pi")]
-        Verb::Board(args) => board::run(&args),
-        Verb::Doctor(args) => doctor::run(&args),
+    failure::report(run_verb(cli.verb))
+}
+
+fn run_verb(verb: Verb) -> Outcome {
+    match verb {
+        #[cfg(feature = "daemon")]
+        Verb::Online(verb) => verb.run(),
         Verb::Simulate(args) => simulate::run(&args),
         Verb::Paths(args) => paths::run(&args),
         Verb::Import(args) => import::run(&args),
@@ -263,15 +262,11 @@ pub fn main() -> ExitCode {
         Verb::Plot(args) => plot::run(&args),
         Verb::Log(verb) => log::run(verb),
         Verb::Generate(args) => generate::run(&args),
-        Verb::Tour(args) => tour::run(&args),
-        Verb::Report(args) => report::run(&args),
         Verb::Completions(args) => completions::run(&args),
-        Verb::PackageFiles(args) => package_files::run(&args),
         Verb::Scene(verb) => scene::run(verb),
         Verb::Sensor(verb) => preset::sensor(&verb),
         Verb::Array(verb) => preset::array(&verb),
-    };
-    failure::report(outcome)
+    }
 }
 
 /// Returns the arguments that name an output, each as verb and option.
@@ -279,13 +274,6 @@ pub fn main() -> ExitCode {
 #[must_use]
 pub fn outputs() -> Vec<String> {
     output::arguments(&Cli::command())
-}
-
-/// Makes an exceeded file-size limit an error of the write, with a message, instead of the end of
-/// the process.
-fn ignore_file_size_signal() {
-    // If no handler can be installed, the system's default applies.
-    drop(signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default()));
 }
 
 #[cfg(test)]

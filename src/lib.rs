@@ -33,7 +33,7 @@
 //! ```
 //!
 //! Those modules are pure: no clock, no file, no socket, and random numbers are passed in. They
-//! build without the feature `daemon`. Behind it, [`link`] opens serial lines, [`ranger`]
+//! build without default features. Behind the feature `daemon`, [`link`] opens serial lines, [`ranger`]
 //! drives the protocol, [`mock`] plays the device from the model, [`store`] keeps logs, and
 //! [`collect`] keeps a collection of scans that is taken over days.
 #![cfg_attr(docsrs, feature(doc_cfg))]
@@ -55,7 +55,7 @@ pub use sonard_model::{acoustics, array, geometry, model, motion, scene, viewpoi
 pub use sonard_plot as plot;
 pub use sonard_records as scan;
 
-#[cfg(feature = "daemon")]
+#[cfg(feature = "cli")]
 pub mod cli;
 #[cfg(feature = "daemon")]
 pub use sonard_api::{self as api, client, config, fleet};
@@ -73,5 +73,5 @@ pub use sonard_mock as mock;
 pub use sonard_mqtt as mqtt;
 #[cfg(feature = "ros")]
 pub use sonard_ros as ros;
-#[cfg(feature = "daemon")]
-pub use sonard_runtime::{backoff, interrupts, messages, supervisor};
+#[cfg(feature = "cli")]
+pub use sonard_runtime::{backoff, interrupts, messages, platform, supervisor};

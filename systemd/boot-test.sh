@@ -3,7 +3,7 @@
 # boot-checks.sh do with the units what an administrator and bad luck do.
 #
 #   systemd/boot-test.sh target/debug/sonard     this program, and the units of this folder
-#   systemd/boot-test.sh sonard_0.1.0-1_amd64.deb   a package, which is upgraded and removed as well
+#   systemd/boot-test.sh sonard_0.2.0-1_amd64.deb   a package, which is upgraded and removed as well
 #
 # Needs root, mounts and control groups, but no systemd on this computer. Where it can't be done it
 # prints LEFT OUT with the reason, and ends with 0. Nothing is left behind, whatever fails.

@@ -1,9 +1,9 @@
-//! Arrays of rangers and courses named on the command line.
+//! Arrays of rangers named on the command line.
 
-use std::{fs, io, path::Path};
+use std::{fs, io};
 
 use super::Failure;
-use crate::array::{ArrayError, RangerArray, RobotCourse};
+use crate::array::{ArrayError, RangerArray};
 
 /// Loads an array from a file, or else from the preset of that name.
 pub(super) fn load_array(name: &str) -> Result<RangerArray, Failure> {
@@ -28,21 +28,6 @@ pub(super) fn load_array(name: &str) -> Result<RangerArray, Failure> {
             other => format!("{name}: {other}"),
         };
         Failure::input(message, error.help())
-    })
-}
-
-/// Loads a course from a file of poses.
-pub(super) fn load_course(path: &Path) -> Result<RobotCourse, Failure> {
-    let name = path.display();
-    let text = fs::read_to_string(path).map_err(|error| {
-        Failure::input(
-            format!("cannot read the poses {name}: {error}"),
-            "give a text file with one pose per line: {\"x_m\": 1.0, \"y_m\": 2.0, \"heading_deg\": 90.0}",
-        )
-    })?;
-    RobotCourse::from_json_lines(&text).map_err(|error| {
-        let message = format!("{name}:{}: {}", error.line, error.message);
-        Failure::input(message, "correct that line")
     })
 }
 

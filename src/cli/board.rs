@@ -7,7 +7,7 @@ use std::sync::{
 
 use rand::RngExt as _;
 
-use super::{Failure, Outcome, output::OutPath, runtime};
+use super::{Failure, Outcome, interruptible, output::OutPath};
 use crate::{
     link::Pty,
     pi::{GpioPins, PiBoard, PiSettings, PinNumbers, serve},
@@ -62,7 +62,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     })?;
     print_line!("listening on {} (interrupt to stop)", pty.path().display());
     let stop = Arc::new(AtomicBool::new(false));
-    runtime::run_interruptible(async move |interrupts| {
+    interruptible::run_interruptible(async move |interrupts| {
         let stopping = Arc::clone(&stop);
         let mut serving = tokio::task::spawn_blocking(move || serve(&mut board, &pty, &stop));
         let served = tokio::select! {

@@ -20,14 +20,16 @@ use tokio::signal::unix::{SignalKind, signal};
 use super::{
     Failure, Outcome,
     daemon::{DaemonArgs, check_scene},
+    interruptible,
     mock_world::{self, MockWorldArgs},
     output::OutPath,
-    runtime::{self, Interrupts},
+    runtime::Interrupts,
 };
 use crate::{
     collect::{
-        CollectionFolder, CollectionJournal, CollectionKeys, CollectionManifest, CollectionPlan,
-        FolderError, JOURNAL, RemoteDevice, RunOptions, ScanDevice, verify_collection,
+        CollectError, CollectionFolder, CollectionJournal, CollectionKeys, CollectionManifest,
+        CollectionPlan, FolderError, JOURNAL, RemoteDevice, RunOptions, ScanDevice,
+        verify_collection,
     },
     config::document,
 };
@@ -133,7 +135,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         return write_report(root);
     }
     let mut plan = load(args)?;
-    runtime::run_interruptible(async |interrupts| {
+    interruptible::run_interruptible(async |interrupts| {
         let daemon = match args.daemon {
             true => Some(find_daemon(args, &mut plan, interrupts.clone()).await?),
             false => None,
@@ -240,4 +242,25 @@ fn failure_from(error: &FolderError) -> Failure {
 fn print(text: &str) -> Outcome {
     let written = std::io::stdout().lock().write_all(text.as_bytes());
     written.or_else(|error| Failure::from_write("standard output", &error))
+}
+
+impl From<CollectError> for Failure {
+    fn from(halt: CollectError) -> Self {
+        match halt {
+            CollectError::Stopped(why) => Self::Found(Some(why)),
+            CollectError::Invalid { message, help } => Self::input(message, help),
+            CollectError::Failed { message, help } => Self::device(message, help),
+        }
+    }
+}
+
+/// Errors of verbs used by a collection.
+impl From<Failure> for CollectError {
+    fn from(failure: Failure) -> Self {
+        match failure {
+            Failure::Found(why) => Self::Stopped(why.unwrap_or_default()),
+            Failure::Input(diagnostic) => Self::invalid(&diagnostic, diagnostic.help()),
+            Failure::Device(diagnostic) => Self::failed(&diagnostic, diagnostic.help()),
+        }
+    }
 }

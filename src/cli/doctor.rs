@@ -9,7 +9,7 @@ mod port_monitor;
 mod report;
 mod tap;
 
-use super::{Failure, Outcome, runtime};
+use super::{Failure, Outcome, interruptible};
 use crate::link::{self, SerialPortInfo};
 use report::Report;
 
@@ -66,7 +66,7 @@ pub(super) fn run(args: &Args) -> Outcome {
             link::list_ports().map_err(|error| Failure::device(&error, error.help()))?;
         return list(&candidates, args.json);
     };
-    let report = runtime::run_interruptible(async |interrupts| {
+    let report = interruptible::run_interruptible(async |interrupts| {
         Ok(examine::examine(port, args, interrupts).await)
     })?;
     report.print(args.json)?;
@@ -80,7 +80,7 @@ pub(super) fn run(args: &Args) -> Outcome {
 /// An interrupt, or a failed start of the runtime.
 pub(super) fn check_without_motion(port: &str) -> Result<String, Failure> {
     let args = Args { port: Some(port.to_owned()), no_motion: true, pings: 10, json: true };
-    let report = runtime::run_interruptible(async |interrupts| {
+    let report = interruptible::run_interruptible(async |interrupts| {
         Ok(examine::examine(port, &args, interrupts).await)
     })?;
     Ok(serde_json::to_string_pretty(&report).unwrap_or_default())

@@ -15,12 +15,12 @@ use super::{
     output::{OutPath, Overwrite, Product, Stream},
 };
 use crate::{
-    collect::SCANS,
     export::{
         AttachedLog, CsvExport, Export, ExportError, ExportSettings, McapExport, ParquetExport,
         Profile,
     },
     scan::text::format_count,
+    store::COLLECTED_SCANS,
 };
 
 /// Options of `sonard export`.
@@ -309,6 +309,6 @@ fn export_name(log: &Path, given: &[PathBuf]) -> String {
     let name = log.file_name().unwrap_or(log.as_os_str()).to_string_lossy();
     let is_given = |folder: &&Path| given.iter().any(|path| path == folder);
     let robot = log.parent().filter(|robot| robot.parent().as_ref().is_some_and(is_given));
-    let robot = robot.and_then(Path::file_name).filter(|robot| *robot != SCANS);
+    let robot = robot.and_then(Path::file_name).filter(|robot| *robot != COLLECTED_SCANS);
     robot.map_or_else(|| name.to_string(), |robot| format!("{}/{name}", robot.to_string_lossy()))
 }

@@ -2,9 +2,8 @@
 
 use std::{io, process::ExitCode};
 
-use miette::Report;
-
-use crate::{collect::CollectError, scan::SinkError};
+use super::Diagnostic;
+use crate::scan::SinkError;
 
 /// Result of a verb.
 pub type Outcome = Result<(), Failure>;
@@ -15,20 +14,20 @@ pub enum Failure {
     /// Negative result (exit code 1), already printed or given as text.
     Found(Option<String>),
     /// Wrong usage or input (exit code 2).
-    Input(Report),
+    Input(Diagnostic),
     /// Error of device, link or disk (exit code 3).
-    Device(Report),
+    Device(Diagnostic),
 }
 
 impl Failure {
     /// Creates a usage or input failure with a message and advice.
     pub fn input(message: impl std::fmt::Display, help: impl std::fmt::Display) -> Self {
-        Self::Input(miette::miette!(help = help.to_string(), "{message}"))
+        Self::Input(Diagnostic::new(message, help))
     }
 
     /// Creates a device or link failure with a message and advice.
     pub fn device(message: impl std::fmt::Display, help: impl std::fmt::Display) -> Self {
-        Self::Device(miette::miette!(help = help.to_string(), "{message}"))
+        Self::Device(Diagnostic::new(message, help))
     }
 
     /// Converts a failed write to standard output or a file; a closed reader is not a failure.
@@ -63,28 +62,6 @@ impl From<SinkError> for Failure {
     }
 }
 
-impl From<CollectError> for Failure {
-    fn from(halt: CollectError) -> Self {
-        match halt {
-            CollectError::Stopped(why) => Self::Found(Some(why)),
-            CollectError::Invalid { message, help } => Self::input(message, help),
-            CollectError::Failed { message, help } => Self::device(message, help),
-        }
-    }
-}
-
-/// Errors of verbs used by a collection.
-impl From<Failure> for CollectError {
-    fn from(failure: Failure) -> Self {
-        let help = |report: &Report| report.help().map(|help| help.to_string()).unwrap_or_default();
-        match failure {
-            Failure::Found(why) => Self::Stopped(why.unwrap_or_default()),
-            Failure::Input(report) => Self::invalid(&report, help(&report)),
-            Failure::Device(report) => Self::failed(&report, help(&report)),
-        }
-    }
-}
-
 /// Returns `true` if the path itself is unsuitable: missing or not writable.
 pub(super) fn is_wrong_place(error: &io::Error) -> bool {
     use io::ErrorKind as Kind;
@@ -101,15 +78,6 @@ pub(super) fn is_wrong_place(error: &io::Error) -> bool {
     )
 }
 
-/// Disables wrapping of failure messages, so that suggested options can be copied.
-pub(super) fn print_whole_lines() {
-    let whole = |_: &dyn miette::Diagnostic| -> Box<dyn miette::ReportHandler> {
-        Box::new(miette::MietteHandlerOpts::new().wrap_lines(false).build())
-    };
-    // A process accepts only its first hook, which is this one.
-    let _ = miette::set_hook(Box::new(move |error| whole(error)));
-}
-
 /// Prints a failure and converts the outcome to an exit code.
 pub(super) fn report(outcome: Outcome) -> ExitCode {
     match outcome {
@@ -120,12 +88,12 @@ pub(super) fn report(outcome: Outcome) -> ExitCode {
             }
             ExitCode::from(1)
         }
-        Err(Failure::Input(report)) => {
-            notice!("{report:?}");
+        Err(Failure::Input(diagnostic)) => {
+            notice!("{}", diagnostic.render());
             ExitCode::from(2)
         }
-        Err(Failure::Device(report)) => {
-            notice!("{report:?}");
+        Err(Failure::Device(diagnostic)) => {
+            notice!("{}", diagnostic.render());
             ExitCode::from(3)
         }
     }

@@ -1,10 +1,6 @@
 //! Width of help texts, and examples that can be pasted at any width.
 
-use std::{
-    env,
-    io::{self, Write as _},
-    process,
-};
+use std::{env, io::Write as _, process};
 
 use textwrap::core::display_width;
 
@@ -15,13 +11,7 @@ const MAX_COLUMNS: usize = 100;
 
 /// Width of help texts on this terminal, columns.
 pub(super) fn columns() -> usize {
-    // The order in which clap looks for a terminal.
-    let streams = [
-        terminal::column_count(io::stdout()),
-        terminal::column_count(io::stderr()),
-        terminal::column_count(io::stdin()),
-    ];
-    let terminal = streams.into_iter().flatten().next().map(usize::from);
+    let terminal = terminal::any_columns().map(usize::from);
     let variable = || env::var("COLUMNS").ok()?.parse().ok();
     terminal.or_else(variable).unwrap_or(MAX_COLUMNS).min(MAX_COLUMNS)
 }

@@ -8,10 +8,12 @@ use std::{
 
 use super::{Failure, output::register_input, progress};
 use crate::{
-    collect::SCANS,
     compare::keep_every_second,
     scan::{Record, ScanView, text::format_count},
-    store::{FileKind, Line, LineError, StoreError, log_files, open_for_reading, read_log},
+    store::{
+        COLLECTED_SCANS, FileKind, Line, LineError, StoreError, log_files, open_for_reading,
+        read_log,
+    },
 };
 
 /// Maximum number of reported damaged lines; further ones are counted.
@@ -56,7 +58,7 @@ pub(super) fn logs_in(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
             logs.push(path.clone());
             continue;
         }
-        let scans = path.join(SCANS);
+        let scans = path.join(COLLECTED_SCANS);
         let folder = if scans.is_dir() { &scans } else { path };
         let found = logs_in_folder(folder).and_then(|found| match found.is_empty() {
             true => logs_of_robots(folder),

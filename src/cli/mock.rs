@@ -7,10 +7,11 @@ use std::{path::PathBuf, sync::Arc};
 use super::{
     Failure, Outcome,
     array::NoArray,
+    interruptible,
     mock_world::{AssumedModel, MockWorldArgs},
     options::{AirArgs, SensorArgs, engine_options},
     output::OutPath,
-    runtime, scene_file,
+    scene_file,
 };
 use crate::{
     mock::{MockBoard, MockPort, Note},
@@ -96,7 +97,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         Some(log) => replay::board(log, &args.world)?,
         None => modelled_board(args)?,
     };
-    runtime::run_interruptible(async move |interrupts| {
+    interruptible::run_interruptible(async move |interrupts| {
         let port = MockPort::open(board, args.link.as_deref()).map_err(|error| {
             Failure::input(
                 format!("cannot make the port: {error}"),

@@ -1,5 +1,8 @@
 //! Options shared by several verbs: sensor, air and engine.
 
+#[cfg(feature = "daemon")]
+mod emulator;
+
 use std::{fs, io};
 
 use super::Failure;
@@ -60,12 +63,6 @@ pub(super) struct AirArgs {
 }
 
 impl SensorArgs {
-    /// Returns the options of `sonard-emulator` for this sensor and its blanking.
-    pub(super) fn emulator(&self, sensor: &Sensor) -> [String; 2] {
-        let name = self.sensor.as_deref().unwrap_or(SENSOR);
-        [format!("--sensor={name}"), format!("--blanking-us={}", sensor.blanking_us)]
-    }
-
     /// Loads the sensor, from a file or else a preset, and applies the overrides.
     pub(super) fn sensor(&self) -> Result<Sensor, Failure> {
         self.sensor_or(SENSOR)
@@ -137,15 +134,6 @@ fn sensor_failure(name: &str, error: &SensorError) -> Failure {
 }
 
 impl AirArgs {
-    /// Returns the options of `sonard-emulator` for this air.
-    pub(super) fn emulator(&self) -> [String; 3] {
-        [
-            format!("--temperature-c={}", self.temperature_c),
-            format!("--humidity-percent={}", self.humidity_percent),
-            format!("--pressure-kpa={}", self.pressure_kpa),
-        ]
-    }
-
     /// Returns the air with the given properties.
     pub(super) fn air(&self) -> Result<Air, Failure> {
         Air::new(self.temperature_c, self.humidity_percent, self.pressure_kpa)

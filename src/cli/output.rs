@@ -11,10 +11,6 @@ use std::{
     ffi::OsStr,
     fs::{self, File, Metadata, OpenOptions},
     io::{self, BufWriter, Read as _, Write as _},
-    os::{
-        fd::{AsFd, BorrowedFd},
-        unix::fs::{FileTypeExt as _, MetadataExt as _},
-    },
     path::{Path, PathBuf},
     sync::{Mutex, PoisonError},
 };
@@ -28,7 +24,10 @@ use clap::{
 use super::{Failure, Outcome};
 use crate::{
     export::{CsvExport, McapExport, ParquetExport, is_geojson},
-    store::{AtomicFile, FileKind, HEAD_BYTES, LogWriter, RecordWriter, StoreError},
+    store::{
+        AtomicFile, FileKind, HEAD_BYTES, LogWriter, RecordWriter, StoreError,
+        platform::{self, FileId},
+    },
 };
 pub(super) use stream::Stream;
 
@@ -111,28 +110,23 @@ fn is_list_of(head: &[u8], members: &[&str]) -> bool {
     })
 }
 
-/// Device and inode of a file, independent of its name.
-type FileId = (u64, u64);
-
 /// Files that this process reads, with their names; a process runs one command line.
 static INPUTS: Mutex<Vec<(FileId, PathBuf)>> = Mutex::new(Vec::new());
 
 /// Registers a file that the command reads but the command line does not name.
 pub(super) fn register_input(path: &Path) {
-    if let Ok(metadata) = fs::metadata(path) {
-        register(&metadata, path);
+    if path.is_file()
+        && let Ok(id) = FileId::of_path(path)
+    {
+        register(id, path);
     }
 }
 
-fn register(metadata: &Metadata, path: &Path) {
-    if metadata.is_file() {
-        let id = (metadata.dev(), metadata.ino());
-        INPUTS.lock().unwrap_or_else(PoisonError::into_inner).push((id, path.into()));
-    }
+fn register(id: FileId, path: &Path) {
+    INPUTS.lock().unwrap_or_else(PoisonError::into_inner).push((id, path.into()));
 }
 
-fn input_name(metadata: &Metadata) -> Option<PathBuf> {
-    let id = (metadata.dev(), metadata.ino());
+fn input_name(id: FileId) -> Option<PathBuf> {
     let read = INPUTS.lock().unwrap_or_else(PoisonError::into_inner);
     read.iter().find(|(known, _)| *known == id).map(|(_, path)| path.clone())
 }
@@ -159,11 +153,10 @@ pub(super) fn register_inputs(command: &Command, matches: &ArgMatches) -> Outcom
                 .for_each(|value| register_input(value.as_ref()));
         }
     }
-    if let Some(metadata) = descriptor_metadata(io::stdin().as_fd()) {
-        register(&metadata, Path::new("standard input"));
+    if let Some(id) = platform::standard_input().as_ref().and_then(id_of_regular) {
+        register(id, Path::new("standard input"));
     }
-    let out = descriptor_metadata(io::stdout().as_fd()).filter(Metadata::is_file);
-    match out.as_ref().and_then(input_name) {
+    match platform::standard_output().as_ref().and_then(id_of_regular).and_then(input_name) {
         Some(read) => Err(Failure::input(
             format!("standard output goes to {}, which this command reads", read.display()),
             "redirect it to another file, and restore this one from a copy if the shell has truncated it",
@@ -192,8 +185,9 @@ pub(super) fn arguments(command: &Command) -> Vec<String> {
     all
 }
 
-fn descriptor_metadata(fd: BorrowedFd<'_>) -> Option<Metadata> {
-    File::from(fd.try_clone_to_owned().ok()?).metadata().ok()
+/// Identity of a file; `None` for a terminal or pipe.
+fn id_of_regular(file: &File) -> Option<FileId> {
+    if file.metadata().ok()?.is_file() { FileId::of_file(file).ok() } else { None }
 }
 
 /// Resolved path of an output, and the existing file.
@@ -234,7 +228,7 @@ impl Destination {
         };
         let existing = fs::metadata(&path).map_err(|error| cannot(&error))?;
         let kind = existing.file_type();
-        if !(kind.is_file() || kind.is_char_device() || kind.is_fifo()) {
+        if !(kind.is_file() || platform::is_stream(kind)) {
             return Err(cannot(&"not a file"));
         }
         Ok(Self { path, existing: Some(existing) })
@@ -345,7 +339,7 @@ pub(super) fn closed(written: Result<(), StoreError>) -> Outcome {
 
 /// Rejects an output that the command reads.
 pub(super) fn reject_input(path: &Path) -> Outcome {
-    let Some(read) = fs::metadata(path).ok().as_ref().and_then(input_name) else { return Ok(()) };
+    let Some(read) = FileId::of_path(path).ok().and_then(input_name) else { return Ok(()) };
     let shown = path.display();
     let as_other = if read == path { String::new() } else { format!(" as {}", read.display()) };
     Err(Failure::input(

@@ -15,8 +15,8 @@ use super::{
     Failure, Outcome,
     daemon::DaemonArgs,
     output::{OutPath, Overwrite, Product},
+    prompt,
     table::{align_right, fit, plain},
-    terminal,
 };
 use crate::scan::text::format_count;
 use entries::Entry;
@@ -113,10 +113,10 @@ fn list(entries: &[Entry]) -> Outcome {
 
 /// Prompts for a confirmation at a terminal; elsewhere the command is the confirmation.
 fn is_confirmed(path: &Path) -> Result<bool, Failure> {
-    if !terminal::is_interactive() {
+    if !prompt::is_interactive() {
         return Ok(true);
     }
-    let answer = terminal::prompt(&format!("write {}? [Y/n]", path.display()))?;
+    let answer = prompt::prompt(&format!("write {}? [Y/n]", path.display()))?;
     // The end of the input is no confirmation.
     Ok(answer.is_some_and(|answer| matches!(answer.to_lowercase().as_str(), "" | "y" | "yes")))
 }

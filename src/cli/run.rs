@@ -19,7 +19,7 @@ use tokio::signal::unix::{Signal as Hangups, SignalKind, signal};
 use tokio_util::sync::CancellationToken;
 
 use super::{
-    Failure, Outcome,
+    Failure, Outcome, interruptible,
     mock_world::MockWorldArgs,
     runtime::{self, Interrupts},
     socket,
@@ -171,7 +171,7 @@ pub(super) fn run(args: Args) -> Outcome {
         tokio::select! {
             biased;
             outcome = served => outcome,
-            () = interrupts.clone().wait_overdue() => Err(runtime::abandoned()),
+            () = interrupts.clone().wait_overdue() => Err(interruptible::abandoned()),
             () = overdue(supervisor.stopping()) => Err(Failure::device(
                 format!("the shutdown took longer than {} s and was abandoned", SHUTDOWN_LIMIT.as_secs()),
                 "see the messages before this one",

@@ -1,4 +1,4 @@
-//! Async runtime of the verbs that use a device or a daemon.
+//! Async runtime of the verbs that wait: for signals, a device or a daemon.
 
 use std::{io, iter, sync::Mutex, thread, time::Duration};
 
@@ -7,8 +7,6 @@ use tokio::runtime::{Builder, Runtime};
 use super::Failure;
 pub(super) use crate::interrupts::Interrupts;
 
-/// Time allowed for remaining tasks and blocking calls after a verb has ended.
-const SHUTDOWN_TIMEOUT: Duration = Duration::from_millis(500);
 /// Pairs of file descriptors that must be free at the start: without them the runtime's signal
 /// handling panics.
 const DESCRIPTOR_PAIRS: usize = 6;
@@ -53,32 +51,4 @@ fn check_threads(count: usize) -> io::Result<()> {
         drop(closed);
         started.map(drop)
     })
-}
-
-/// Runs a verb that stops in an orderly way on a signal. After a second signal it is abandoned
-/// within a few seconds; its resources are dropped in either case, and blocking calls are not
-/// waited for.
-///
-/// # Errors
-///
-/// Errors of the verb, a forced stop, or a failed start of the runtime.
-pub(super) fn run_interruptible<T>(
-    work: impl AsyncFnOnce(Interrupts) -> Result<T, Failure>,
-) -> Result<T, Failure> {
-    let runtime = new()?;
-    let outcome = runtime.block_on(async {
-        let interrupts = Interrupts::listen();
-        tokio::select! {
-            biased;
-            outcome = work(interrupts.clone()) => outcome,
-            () = interrupts.wait_overdue() => Err(abandoned()),
-        }
-    });
-    runtime.shutdown_timeout(SHUTDOWN_TIMEOUT);
-    outcome
-}
-
-/// Failure of a verb that was forced to stop.
-pub(super) fn abandoned() -> Failure {
-    Failure::Found(Some("interrupted again: stopped without closing everything".into()))
 }

@@ -16,12 +16,13 @@ use super::{
     Failure, Outcome,
     array::NoArray,
     daemon::DaemonArgs,
+    interruptible,
     mock_world::{self, MockWorldArgs},
     numbers::within,
     options::{AirArgs, SensorArgs},
     output::OutPath,
     place::{AzimuthArgs, PlaceArgs},
-    runtime::{self, Interrupts},
+    runtime::Interrupts,
 };
 use crate::{
     link::{self, BAUD, PortOpener},
@@ -171,7 +172,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     }
     let setup = prepare(args)?;
     let mut output = Output::open(args.out.as_deref())?;
-    let measured = runtime::run_interruptible(async |interrupts| {
+    let measured = interruptible::run_interruptible(async |interrupts| {
         measure(args, &setup, &mut output, &interrupts).await
     });
     // After any outcome, the log is closed and the measured scan is drawn.

@@ -2,9 +2,7 @@
 
 use std::{fs, io, path::Path};
 
-use miette::{LabeledSpan, MietteDiagnostic, NamedSource, Report};
-
-use super::{Failure, output::register_input};
+use super::{Diagnostic, Failure, output::register_input};
 use crate::{
     geometry::Pose,
     scan::Session,
@@ -21,7 +19,7 @@ pub(super) fn load(path_or_name: impl AsRef<Path>) -> Result<Scene, Failure> {
     let path_or_name = path_or_name.as_ref();
     let text = read(path_or_name)?;
     let name = path_or_name.display().to_string();
-    Scene::from_json(&text).map_err(|error| Failure::Input(report(&name, text, &error)))
+    Scene::from_json(&text).map_err(|error| Failure::Input(describe(&name, text, &error)))
 }
 
 /// Reads and checks a shipped scene, ignoring files of that name.
@@ -31,7 +29,7 @@ pub(super) fn load(path_or_name: impl AsRef<Path>) -> Result<Scene, Failure> {
 /// No shipped scene of that name.
 pub(super) fn shipped(name: &str) -> Result<Scene, Failure> {
     let text = shipped::text(name).ok_or_else(|| no_such_scene(name))?;
-    Scene::from_json(text).map_err(|error| Failure::Input(report(name, text.to_owned(), &error)))
+    Scene::from_json(text).map_err(|error| Failure::Input(describe(name, text.to_owned(), &error)))
 }
 
 /// Returns the scene of a session's predictions: the one in the log, or else the shipped scene of
@@ -116,22 +114,19 @@ const MAX_LINE_BYTES: usize = 400;
 /// Maximum length of a file region shown in full, bytes.
 const MAX_REGION_BYTES: usize = 10_000;
 
-/// Reports an error with the affected line of the file. The first line contains `file:line:column`.
-fn report(name: &str, text: String, error: &SceneError) -> Report {
-    let label = if error.path.is_empty() { "here".to_owned() } else { sanitize(&error.path) };
-    let diagnostic = MietteDiagnostic::new(format!("{name}:{error}")).with_help(error.help());
+/// Describes an error with the affected lines of the file. The message begins with
+/// `file:line:column`.
+fn describe(name: &str, text: String, error: &SceneError) -> Diagnostic {
+    let message = format!("{name}:{error}");
     let (before, after) = text.split_at(error.span.start);
     let near = before.rsplit('\n').take(3).chain(after.split('\n').take(3));
     let longest = near.map(str::len).max().unwrap_or_default();
     if longest > MAX_LINE_BYTES || error.span.len() > MAX_REGION_BYTES {
         // Line and column suffice for a very long line, of which an excerpt is shown.
         let excerpt: String = after.chars().take(MAX_LINE_BYTES).collect();
-        return Report::new(diagnostic.with_help(format!(
-            "{}\nthere: {}",
-            error.help(),
-            sanitize(&excerpt)
-        )));
+        let help = format!("{}\nthere: {}", error.help(), sanitize(&excerpt));
+        return Diagnostic::new(message, help);
     }
-    let diagnostic = diagnostic.with_label(LabeledSpan::at(error.span.clone(), label));
-    Report::new(diagnostic).with_source_code(NamedSource::new(name, text).with_language("json"))
+    let label = if error.path.is_empty() { "here".to_owned() } else { sanitize(&error.path) };
+    Diagnostic::new(message, error.help()).with_excerpt(text, error.span.clone(), label)
 }

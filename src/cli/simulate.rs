@@ -25,8 +25,8 @@ use super::{
 };
 use crate::{
     acoustics::ReceiverNoise,
-    collect::{PoseLine, parse_pose_lines},
     geometry::Pose,
+    import::poses::{PoseLine, parse_pose_lines},
     model::{ModelError, ObservationPoint, OptionKeys, Prediction, Simulator, TooCostly},
     scan::{Ping, Record, ScanEnd, ScanPlan, ScanStart, Session},
     scene::Scene,

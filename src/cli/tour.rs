@@ -7,7 +7,8 @@ use std::{
     process::{Command, Stdio},
 };
 
-use super::{Failure, Outcome, output::OutPath, terminal};
+use super::{Failure, Outcome, output::OutPath, prompt};
+use crate::platform::picture_viewer;
 
 /// Options of `sonard tour`.
 #[derive(Debug, clap::Args)]
@@ -102,7 +103,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let program = env::current_exe().map_err(|error| {
         Failure::device(format!("cannot find this program: {error}"), "start it by its full path")
     })?;
-    let prompts = !args.yes && terminal::is_interactive();
+    let prompts = !args.yes && prompt::is_interactive();
     let viewer = if args.no_open { None } else { viewer() };
     for (number, step) in (1..).zip(&STEPS) {
         introduce(number, step)?;
@@ -159,7 +160,7 @@ fn print_text(text: &str) -> Outcome {
 
 /// Waits for Enter; `q` and the end of the input end the tour.
 fn continues() -> Result<bool, Failure> {
-    let answer = terminal::prompt("  (Enter runs it, q ends the tour)")?;
+    let answer = prompt::prompt("  (Enter runs it, q ends the tour)")?;
     Ok(answer.is_some_and(|answer| !answer.eq_ignore_ascii_case("q")))
 }
 
@@ -196,15 +197,9 @@ fn show(picture: &Path, viewer: Option<&str>) -> Outcome {
     print_text(&format!("  {verb} {}", path.display()))
 }
 
-/// Program that opens files on this desktop.
+/// Program that opens pictures on this desktop, for a reader at a terminal.
 fn viewer() -> Option<&'static str> {
-    if cfg!(target_os = "macos") {
-        return Some("open");
-    }
-    let has_desktop = ["DISPLAY", "WAYLAND_DISPLAY"]
-        .iter()
-        .any(|name| env::var_os(name).is_some_and(|value| !value.is_empty()));
-    (has_desktop && io::stdout().is_terminal()).then_some("xdg-open")
+    picture_viewer().filter(|_| io::stdout().is_terminal())
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use tokio::time::sleep;
 use super::{
     Failure, Outcome,
     daemon::{Daemons, DaemonsArgs, failure_from},
-    runtime,
+    interruptible,
 };
 use crate::{
     backoff::Backoff,
@@ -61,7 +61,7 @@ pub(super) fn run(args: &Args) -> Outcome {
         (false, Some(moved_m)) => format!("/v1/live/records?moved_m={moved_m}"),
         (false, None) => "/v1/live/records".to_owned(),
     };
-    runtime::run_interruptible(async |interrupts| {
+    interruptible::run_interruptible(async |interrupts| {
         tokio::select! {
             watch_all = watch_all(args, &path) => watch_all,
             () = interrupts.wait() => Ok(()),

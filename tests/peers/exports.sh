@@ -11,7 +11,7 @@ target=${CARGO_TARGET_DIR:-target}
 tools=$target/tools/exports
 tests/venv.sh "$tools" EXPORT_PEERS=0 "${packages[@]}"
 program=$(realpath "${1:-$target/debug/sonard}")
-if [ $# = 0 ]; then cargo build --quiet --features mqtt,ros,sqlite; fi
+if [ $# = 0 ]; then cargo build --quiet --features full; fi
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

@@ -10,6 +10,6 @@ target=${CARGO_TARGET_DIR:-target}
 tools=$target/tools/imports
 tests/venv.sh "$tools" IMPORT_PEERS=0 "${packages[@]}"
 program=$(realpath "${1:-$target/debug/sonard}")
-if [ $# = 0 ]; then cargo build --quiet --features mqtt,ros,sqlite; fi
+if [ $# = 0 ]; then cargo build --quiet --features full; fi
 "$tools/bin/python" tests/peers/imports.py "$program"
 "$tools/bin/python" tests/peers/floor_plans.py "$program"

@@ -14,5 +14,5 @@ for tool in mosquitto mosquitto_sub mosquitto_pub mosquitto_passwd openssl pytho
   }
 done
 program=$(realpath "${1:-$target/debug/sonard}")
-if [ $# = 0 ]; then cargo build --quiet --features mqtt,ros,sqlite; fi
+if [ $# = 0 ]; then cargo build --quiet --features full; fi
 PATH=$PATH:/usr/sbin timeout 600 python3 tests/peers/mqtt.py "$program"

@@ -7,7 +7,7 @@ set -euo pipefail
 cd "$(dirname "$0")/../.."
 . tests/peers/ros-tools.sh
 program=$(realpath "${1:-${CARGO_TARGET_DIR:-target}/debug/sonard}")
-if [ $# = 0 ]; then cargo build --quiet --features mqtt,ros,sqlite; fi
+if [ $# = 0 ]; then cargo build --quiet --features full; fi
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT

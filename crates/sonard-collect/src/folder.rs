@@ -14,7 +14,7 @@ use std::{
 };
 
 use sha2::{Digest as _, Sha256};
-use sonard_log::{AtomicFile, file_digest, sync_folder_of, to_hex};
+use sonard_log::{AtomicFile, COLLECTED_SCANS as SCANS, file_digest, sync_folder_of, to_hex};
 
 use super::order::Slot;
 
@@ -22,8 +22,6 @@ pub use error::FolderError;
 
 /// Subfolder of scans being recorded: empty unless the program is running or was killed.
 pub(super) const IN_PROGRESS: &str = "in-progress";
-/// Subfolder of accepted scans.
-pub const SCANS: &str = "scans";
 /// Subfolder of incomplete and rejected scans.
 pub const REJECTED: &str = "rejected";
 /// Subfolder with copies of plan, scene and sensor.

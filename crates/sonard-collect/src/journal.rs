@@ -12,6 +12,7 @@ use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sonard_api::{AirOrder, config::ScanningKeys};
+use sonard_import::poses::{Conditions, NamedPose};
 use sonard_log::{open_no_follow, sync_file};
 use sonard_records::{Device, Provenance, SceneRef};
 use uuid::Uuid;
@@ -19,9 +20,8 @@ use uuid::Uuid;
 use super::{
     checks::{CheckFinding, ScanFigures},
     folder::FolderError,
-    keys::{CollectionKeys, Conditions},
+    keys::CollectionKeys,
     order::{Slot, slots},
-    poses::NamedPose,
 };
 
 /// Line of the journal.

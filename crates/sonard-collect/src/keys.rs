@@ -10,10 +10,8 @@ use serde::{Deserialize, Serialize};
 use sonard_api::config::{
     CollectionAirKeys, ConfigForm, DeviceKeys, MotionKeys, PlanKeys, Section, read_sections,
 };
+use sonard_import::poses::Conditions;
 use sonard_model::model::OptionKeys;
-
-/// Conditions recorded with a scan: name and value.
-pub type Conditions = serde_json::Map<String, serde_json::Value>;
 
 /// Plan of `sonard collect`.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]

@@ -28,7 +28,6 @@ mod order;
 mod plan;
 mod plan_changes;
 mod pose_source;
-mod poses;
 mod record_scan;
 mod remote_device;
 mod repeatability;
@@ -40,15 +39,15 @@ pub use engine::{RunOptions, collect};
 pub use error::CollectError;
 pub use estimate::{budget, disk_bytes};
 pub use folder::{
-    CollectionFolder, FolderError, INPUTS, JOURNAL, REJECTED, SCANS, SealedFile, scan_stem, sha256,
+    CollectionFolder, FolderError, INPUTS, JOURNAL, REJECTED, SealedFile, scan_stem, sha256,
 };
 pub use journal::{
     CollectionHistory, CollectionJournal, JournalEntry, PlanEntry, RunStart, SavedAir,
     SavedSettings, ScanAttempt, ScanOutcome, read_journal,
 };
 pub use keys::{
-    Action, AfterRetakes, AirAction, AskKeys, CheckKeys, CollectionKeys, CollectionSection,
-    Conditions, Order, PosesKeys, SceneKeys, SensorKeys,
+    Action, AfterRetakes, AirAction, AskKeys, CheckKeys, CollectionKeys, CollectionSection, Order,
+    PosesKeys, SceneKeys, SensorKeys,
 };
 pub use manifest::{
     CollectionCounts, CollectionManifest, FileEntry, MANIFEST, ScanEntry, Verification,
@@ -57,8 +56,9 @@ pub use manifest::{
 pub use observer::Observer;
 pub use order::{Slot, slots};
 pub use plan::{CollectionPlan, Poses};
-pub use poses::{NamedPose, PoseFault, PoseLine, find_numbers, parse_pose_file, parse_pose_lines};
 pub use record_scan::{RecordedScan, record_scan};
 pub use remote_device::{RemoteDevice, steps_per_revolution};
 pub use repeatability::{BeamSpread, Repeatability, repeatability};
 pub use retry::RetrySchedule;
+pub use sonard_import::poses::{Conditions, NamedPose, PoseFault, find_numbers, parse_pose_file};
+pub use sonard_log::COLLECTED_SCANS as SCANS;

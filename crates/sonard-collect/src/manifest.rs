@@ -10,6 +10,7 @@ use std::{
 use jiff::Timestamp;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use sonard_import::poses::NamedPose;
 use sonard_log::{Severity, check_log, load};
 use sonard_records::SceneRef;
 use uuid::Uuid;
@@ -18,7 +19,6 @@ use super::{
     folder::{CollectionFolder, FolderError, JOURNAL, SealedFile},
     journal::{CollectionHistory, RunStart, ScanOutcome, read_journal},
     order::Slot,
-    poses::NamedPose,
 };
 
 /// File name of the manifest.

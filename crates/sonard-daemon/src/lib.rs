@@ -27,6 +27,7 @@ mod link_state;
 mod live_messages;
 mod notify;
 mod order_error;
+mod platform;
 mod prediction_cache;
 mod schedule;
 pub mod secret;

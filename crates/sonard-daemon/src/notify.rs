@@ -3,12 +3,9 @@
 
 use std::{
     io,
-    os::{
-        linux::net::SocketAddrExt as _,
-        unix::{
-            ffi::OsStrExt as _,
-            net::{SocketAddr, UnixDatagram},
-        },
+    os::unix::{
+        ffi::OsStrExt as _,
+        net::{SocketAddr, UnixDatagram},
     },
     sync::Arc,
     time::Duration,
@@ -19,7 +16,7 @@ use sonard_api::LinkState;
 use tokio::time::interval;
 use tokio_util::sync::CancellationToken;
 
-use super::state::DaemonState;
+use super::{platform::abstract_address, state::DaemonState};
 
 /// Interval at which the start-up timeout of systemd is extended while the ranger is absent.
 const EXTENSION_INTERVAL: Duration = Duration::from_secs(5);
@@ -87,7 +84,7 @@ impl ServiceManager {
     fn connect() -> io::Result<Option<Self>> {
         let Some(name) = std::env::var_os("NOTIFY_SOCKET") else { return Ok(None) };
         let address = match name.as_bytes().strip_prefix(b"@") {
-            Some(name) => SocketAddr::from_abstract_name(name)?,
+            Some(name) => abstract_address(name)?,
             None => SocketAddr::from_pathname(&name)?,
         };
         let socket = UnixDatagram::unbound()?;

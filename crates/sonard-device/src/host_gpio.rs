@@ -72,10 +72,7 @@ pub fn check(keys: &GpioKeys) -> Result<(), HostGpioError> {
         return Ok(());
     }
     #[cfg(feature = "pi")]
-    return match rppal::system::DeviceInfo::new() {
-        Ok(_) => Ok(()),
-        Err(_) => Err(HostGpioError::Gpio(crate::pi::GpioError::NotAPi)),
-    };
+    return crate::platform::gpio::check_model().map_err(|error| HostGpioError::Gpio(error.into()));
     #[cfg(not(feature = "pi"))]
     Err(HostGpioError::NotBuilt)
 }
@@ -102,10 +99,10 @@ pub fn open(keys: &GpioKeys) -> Result<Box<dyn HostGpio>, HostGpioError> {
 mod raspberry_pi {
     use std::{thread, time::Duration};
 
-    use rppal::gpio::{Error, Gpio, InputPin, OutputPin};
     use sonard_api::config::GpioKeys;
 
     use super::HostGpio;
+    use crate::platform::gpio::{Error, Gpio, InputPin, OutputPin};
 
     const RESET: Duration = Duration::from_millis(50);
 

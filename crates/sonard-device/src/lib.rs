@@ -10,5 +10,6 @@ pub mod host_gpio;
 pub mod link;
 #[cfg(feature = "pi")]
 pub mod pi;
+mod platform;
 pub mod ranger;
 pub mod thermometer;

@@ -10,7 +10,10 @@ mod pty;
 
 use std::{
     fs, io,
-    os::unix::fs::{FileTypeExt as _, MetadataExt as _},
+    os::{
+        fd::{AsRawFd, OwnedFd},
+        unix::fs::{FileTypeExt as _, MetadataExt as _},
+    },
     path::{Path, PathBuf},
 };
 
@@ -29,6 +32,8 @@ pub use opener::PortOpener;
 use ports::{PortFolders, Resolved};
 pub use ports::{SerialPortInfo, list_ports};
 pub use pty::Pty;
+
+use crate::platform::{duplicate_descriptor, is_console};
 
 /// Byte stream to a device: a serial port or an in-memory pipe.
 pub trait Line: AsyncRead + AsyncWrite + Send + Unpin {}
@@ -67,6 +72,14 @@ pub fn device_path(port: &str) -> Result<PathBuf, LinkError> {
     Ok(holders::real_path(&resolve(port, None)?.path))
 }
 
+/// Duplicates the descriptor of an open line, which exposes it only as a number.
+///
+/// # Errors
+/// Returns the error of the system, for example of a kernel without the call.
+pub fn duplicate(line: &impl AsRawFd) -> io::Result<OwnedFd> {
+    duplicate_descriptor(line.as_raw_fd())
+}
+
 /// Describes the other programs that have `port` open, with a remedy; `None` if none is visible.
 ///
 /// A program that reads the same port consumes bytes, which looks like an unresponsive or faulty
@@ -87,7 +100,9 @@ pub fn describe_contention(port: &str) -> Option<String> {
 fn resolve(port: &str, preferred: Option<&str>) -> Result<Resolved, LinkError> {
     let path = PathBuf::from(port);
     match fs::metadata(&path) {
-        Ok(metadata) if metadata.file_type().is_char_device() && !is_console(&metadata) => {
+        Ok(metadata)
+            if metadata.file_type().is_char_device() && !is_console(&path, metadata.rdev()) =>
+        {
             return Ok(Resolved { path, matched_id: None });
         }
         Ok(_) => return Err(LinkError::NotSerial(path)),
@@ -97,13 +112,6 @@ fn resolve(port: &str, preferred: Option<&str>) -> Result<Resolved, LinkError> {
         Err(_) => {}
     }
     PortFolders::system().find(port, preferred)
-}
-
-/// Returns `true` for an interactive terminal: the process's own (`/dev/tty`), the pty multiplexer
-/// (`/dev/ptmx`), or a virtual console (`/dev/tty1`). Opening one would lock it.
-fn is_console(metadata: &fs::Metadata) -> bool {
-    let device = metadata.rdev();
-    matches!((rustix::fs::major(device), rustix::fs::minor(device)), (5, 0 | 2) | (4, 0..64))
 }
 
 /// Returns `true` if a path can be opened and is not a terminal, such as `/dev/null`. Called only

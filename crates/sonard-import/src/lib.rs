@@ -25,6 +25,7 @@ mod mapping;
 mod no_echo_constant;
 mod number;
 mod player;
+pub mod poses;
 mod reading;
 #[cfg(feature = "recordings")]
 mod recording;

@@ -2,19 +2,17 @@
 
 use std::{
     ffi::{OsStr, OsString},
-    fs::{File, Permissions},
+    fs::File,
     io::{self, Write},
-    os::{fd::AsRawFd as _, unix::fs::PermissionsExt as _},
     path::{Path, PathBuf},
 };
 
-use rustix::{
-    fs::{AtFlags, CWD, Mode, OFlags, linkat, open},
-    io::Errno,
-};
 use tempfile::{Builder, NamedTempFile};
 
-use super::sync::{sync_file, sync_folder_of};
+use super::{
+    platform::{create_unnamed, name_file, with_mode},
+    sync::{sync_file, sync_folder_of},
+};
 
 /// Mode of a new file, reduced by the umask.
 const MODE: u32 = 0o666;
@@ -46,7 +44,7 @@ impl AtomicFile {
         if path.file_name().is_none() {
             return Err(io::ErrorKind::IsADirectory.into());
         }
-        let draft = match unnamed_file(folder_of(&path))? {
+        let draft = match create_unnamed(folder_of(&path), MODE)? {
             Some(file) => Draft::Unnamed(file),
             None => Draft::Named(hidden_names(&prefix(&path)).tempfile_in(folder_of(&path))?),
         };
@@ -64,7 +62,7 @@ impl AtomicFile {
             Draft::Named(draft) => draft.persist(&path).map(drop).map_err(|error| error.error),
             // linkat(2) cannot replace a file, rename(2) can.
             Draft::Unnamed(file) => hidden_names(&prefix(&path))
-                .make_in(folder_of(&path), |name| link(&file, name))?
+                .make_in(folder_of(&path), |name| name_file(&file, name))?
                 .persist(&path)
                 .map_err(|error| error.error),
         };
@@ -102,32 +100,10 @@ impl Write for AtomicFile {
     }
 }
 
-/// Creates an unnamed file in a folder; `None` if the system does not support such files or their
-/// later naming.
-fn unnamed_file(folder: &Path) -> io::Result<Option<File>> {
-    if !Path::new(DESCRIPTORS).exists() {
-        return Ok(None);
-    }
-    let flags = OFlags::TMPFILE | OFlags::RDWR | OFlags::CLOEXEC;
-    match open(folder, flags, Mode::from_raw_mode(MODE)) {
-        Ok(file) => Ok(Some(file.into())),
-        // Errors of kernels and file systems without O_TMPFILE.
-        Err(Errno::OPNOTSUPP | Errno::ISDIR | Errno::INVAL) => Ok(None),
-        Err(error) => Err(error.into()),
-    }
-}
-
-const DESCRIPTORS: &str = "/proc/self/fd";
-
-fn link(file: &File, name: &Path) -> io::Result<()> {
-    let descriptor = format!("{DESCRIPTORS}/{}", file.as_raw_fd());
-    Ok(linkat(CWD, descriptor, CWD, name, AtFlags::SYMLINK_FOLLOW)?)
-}
-
 /// Builder of hidden temporary file names.
 fn hidden_names(prefix: &OsStr) -> Builder<'_, 'static> {
     let mut builder = Builder::new();
-    builder.prefix(prefix).suffix(".new").permissions(Permissions::from_mode(MODE));
+    with_mode(builder.prefix(prefix).suffix(".new"), MODE);
     builder
 }
 
@@ -144,6 +120,8 @@ fn folder_of(path: &Path) -> &Path {
 
 #[cfg(test)]
 mod tests {
+    use std::os::unix::fs::PermissionsExt as _;
+
     use super::*;
 
     fn names_in(folder: &Path) -> Vec<OsString> {

@@ -5,11 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use rustix::{fs::statvfs, io::Errno};
 use sonard_records::{EncodeError, SinkError};
 use thiserror::Error;
 
-use super::{Displacement, FileKind, LineError};
+use super::{Displacement, FileKind, LineError, platform};
 
 /// Error in opening, reading, writing, syncing or repairing a log.
 #[derive(Debug, Error)]
@@ -185,7 +184,7 @@ fn help_for(error: &io::Error, path: &Path) -> String {
         Kind::PermissionDenied => "choose a writable folder, or change its permissions",
         Kind::IsADirectory => "name a file in that folder",
         Kind::InvalidInput => "move that file away, or choose another path",
-        _ if is_out_of_descriptors(error) => {
+        _ if platform::is_out_of_descriptors(error) => {
             "no file descriptors are left: close programs, or raise the limit (`ulimit -n`, LimitNOFILE=)"
         }
         _ => "check the disk; all synced records are in the log",
@@ -197,15 +196,8 @@ fn help_for(error: &io::Error, path: &Path) -> String {
 /// report inodes.
 fn has_free_inodes(path: &Path) -> bool {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let stat = statvfs(path).or_else(|_| statvfs(folder.unwrap_or(Path::new("."))));
-    // File systems without a fixed number of inodes report zero.
-    stat.map_or(true, |stat| stat.f_files == 0 || stat.f_favail > 0)
-}
-
-/// Returns `true` if the process or the system has no free file descriptors.
-pub(crate) fn is_out_of_descriptors(error: &io::Error) -> bool {
-    let errno = error.raw_os_error();
-    [Errno::MFILE, Errno::NFILE].iter().any(|limit| errno == Some(limit.raw_os_error()))
+    let found = platform::has_free_inodes(path);
+    found.or_else(|_| platform::has_free_inodes(folder.unwrap_or(Path::new(".")))).unwrap_or(true)
 }
 
 fn help_for_reading(error: &io::Error) -> &'static str {

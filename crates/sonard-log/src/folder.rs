@@ -6,7 +6,6 @@ mod retained;
 use std::{
     fs::{self, File},
     io::{self, BufReader},
-    os::unix::fs::FileExt as _,
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
@@ -14,10 +13,15 @@ use std::{
 use jiff::{Timestamp, tz::TimeZone};
 use sonard_records::{Event, EventKind, Record, Session};
 
-use super::{Displacement, LogWriter, StoreError, read_log, sync::sync_folder_of};
+use super::{
+    Displacement, LogWriter, StoreError, platform::read_exact_at, read_log, sync::sync_folder_of,
+};
 
 use replacement::Replacement;
 use retained::RetainedLines;
+
+/// Folder within a collection that holds its accepted scans.
+pub const COLLECTED_SCANS: &str = "scans";
 
 const PREFIX: &str = "sonard-";
 const SUFFIX: &str = ".jsonl";
@@ -422,7 +426,7 @@ fn ends_within_scan(path: &Path) -> io::Result<bool> {
         // The overlap finds a match across the chunk boundary.
         let stop = (end + START.len() as u64).min(length);
         let mut bytes = vec![0; (stop - start) as usize];
-        file.read_exact_at(&mut bytes, start)?;
+        read_exact_at(&file, &mut bytes, start)?;
         let last = |what: &[u8]| bytes.windows(what.len()).rposition(|window| window == what);
         match (last(START), last(END)) {
             (None, None) => end = start,

@@ -18,6 +18,7 @@ pub mod grid_file;
 mod history;
 mod log_position;
 mod open;
+pub mod platform;
 mod reader;
 mod repair;
 mod scenes;
@@ -29,7 +30,7 @@ pub use atomic_file::AtomicFile;
 pub use check::{Checker, FindingKind, LogFinding, LogTotals, Severity, check_log};
 pub use error::StoreError;
 pub use file_kind::{FileKind, HEAD_BYTES};
-pub use folder::{LogFile, LogFolder, Rotation, log_files};
+pub use folder::{COLLECTED_SCANS, LogFile, LogFolder, Rotation, log_files};
 pub use format::RecordWriter;
 pub use history::{LogIndex, LoggedScan, ScanSpan, ScanSpanLines};
 pub use log_position::{

@@ -2,22 +2,19 @@
 
 use std::{
     ffi::OsString,
-    fs::{self, File, OpenOptions},
+    fs::{self, File, OpenOptions, TryLockError},
     io::{self, Seek, SeekFrom},
-    os::unix::fs::{FileExt, MetadataExt, OpenOptionsExt},
     path::{Path, PathBuf},
 };
 
 use jiff::Timestamp;
-use rustix::{
-    fs::{FlockOperation, OFlags, flock},
-    io::Errno,
-};
 use sonard_records::{Event, EventKind, MAX_LINE_BYTES};
 
 use super::{
-    FileOutput, LogOutput, PipeOutput, StoreError, reader,
-    sync::{is_unsupported, sync_file, sync_folder_of},
+    FileOutput, LogOutput, PipeOutput, StoreError,
+    platform::{self, FileId, is_unsupported, read_exact_at},
+    reader,
+    sync::{sync_file, sync_folder_of},
 };
 
 /// Repair made at the end of a log.
@@ -81,14 +78,18 @@ pub(super) fn open_file(
 /// # Errors
 /// Returns the error of the system, or an error for a symbolic link.
 pub fn open_no_follow(options: &mut OpenOptions, path: &Path) -> io::Result<File> {
-    let opened = options.custom_flags(OFlags::NOFOLLOW.bits().cast_signed()).open(path);
-    opened.map_err(|error| match fs::symlink_metadata(path) {
+    let rejected = |error| match fs::symlink_metadata(path) {
         Ok(there) if there.is_symlink() => io::Error::new(
             io::ErrorKind::InvalidInput,
             "it is a symbolic link, whose target is not modified",
         ),
         _ => error,
-    })
+    };
+    let file = platform::reject_links(options).open(path).map_err(rejected)?;
+    if file.metadata()?.is_symlink() {
+        return Err(rejected(io::ErrorKind::InvalidInput.into()));
+    }
+    Ok(file)
 }
 
 /// Opens and locks a regular file, and reopens it if a repair replaced the file between opening and
@@ -106,8 +107,8 @@ fn open_locked(path: &Path) -> Result<File, StoreError> {
             )));
         }
         lock(&file, path)?;
-        let named = fs::symlink_metadata(path);
-        if named.is_ok_and(|named| (named.dev(), named.ino()) == (ours.dev(), ours.ino())) {
+        let id = FileId::of_file(&file).map_err(fail)?;
+        if FileId::of_entry(path).is_ok_and(|named| named == id) {
             return Ok(file);
         }
     }
@@ -115,29 +116,29 @@ fn open_locked(path: &Path) -> Result<File, StoreError> {
 
 /// Acquires the advisory lock of writers and repairs.
 pub(super) fn lock(file: &File, path: &Path) -> Result<(), StoreError> {
-    match flock(file, FlockOperation::NonBlockingLockExclusive) {
+    match file.try_lock() {
         Ok(()) => Ok(()),
-        Err(rustix::io::Errno::WOULDBLOCK) => Err(StoreError::Busy { path: path.into() }),
-        Err(error) if is_unsupported(error.raw_os_error()) || error == Errno::NOLCK => {
+        Err(TryLockError::WouldBlock) => Err(StoreError::Busy { path: path.into() }),
+        Err(TryLockError::Error(error)) if is_unsupported(&error) => {
             tracing::warn!(
                 "{} cannot be locked on this file system ({error}): make sure that no other program writes to it",
                 path.display()
             );
             Ok(())
         }
-        Err(error) => Err(StoreError::Open { path: path.into(), source: error.into() }),
+        Err(TryLockError::Error(source)) => Err(StoreError::Open { path: path.into(), source }),
     }
 }
 
 /// Returns `true` if a process is writing or repairing the log.
 #[must_use]
 pub fn is_locked(file: &File) -> bool {
-    let busy = flock(file, FlockOperation::NonBlockingLockShared);
-    if busy.is_ok() {
+    let locked = file.try_lock_shared();
+    if locked.is_ok() {
         // Released immediately: the lock was only a test.
-        let _ = flock(file, FlockOperation::Unlock);
+        let _ = file.unlock();
     }
-    busy == Err(rustix::io::Errno::WOULDBLOCK)
+    matches!(locked, Err(TryLockError::WouldBlock))
 }
 
 /// Repairs the end of a log, so that it ends with a newline. Torn bytes move to a separate file.
@@ -150,7 +151,7 @@ fn repair_end(file: &File, path: &Path) -> io::Result<Option<Recovered>> {
     }
     if bytes <= MAX_LINE_BYTES as u64 {
         let mut last = vec![0; bytes as usize];
-        file.read_exact_at(&mut last, offset)?;
+        read_exact_at(file, &mut last, offset)?;
         if reader::decode(&last, if offset == 0 { 1 } else { 2 }, false).is_ok() {
             io::Write::write_all(&mut &*file, b"\n")?;
             sync_file(file)?;
@@ -171,7 +172,7 @@ fn last_line_offset(file: &File, length: u64) -> io::Result<u64> {
     while end > 0 {
         let start = end.saturating_sub(chunk.len() as u64);
         let part = &mut chunk[..(end - start) as usize];
-        file.read_exact_at(part, start)?;
+        read_exact_at(file, part, start)?;
         if let Some(at) = part.iter().rposition(|&byte| byte == b'\n') {
             return Ok(start + at as u64 + 1);
         }

@@ -5,14 +5,13 @@ use std::{
     fmt,
     fs::{self, File},
     io::{self, Seek as _, SeekFrom, Write},
-    os::{
-        fd::AsRawFd as _,
-        unix::fs::{FileExt as _, MetadataExt as _},
-    },
     path::Path,
 };
 
-use super::sync::{sync_file, sync_folder_of};
+use super::{
+    platform::{FileId, is_removed_when_closed, link_count, read_exact_at},
+    sync::{sync_file, sync_folder_of},
+};
 
 /// Maximum length of a file's end that is searched for lines, bytes.
 const MAX_SEARCHED_BYTES: u64 = 64 << 20;
@@ -159,14 +158,6 @@ impl fmt::Display for Displacement {
     }
 }
 
-/// Returns `true` if the file was removed but its file system keeps it under a hidden name until it
-/// is closed: NFS and FUSE.
-fn is_removed_when_closed(file: &File) -> bool {
-    let path = fs::read_link(format!("/proc/self/fd/{}", file.as_raw_fd())).unwrap_or_default();
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    name.starts_with(".nfs") || name.starts_with(".fuse_hidden")
-}
-
 /// Regular file, opened for appending and locked.
 #[derive(Debug)]
 pub struct FileOutput {
@@ -208,16 +199,17 @@ impl LogOutput for FileOutput {
 
     fn displacement(&self, path: &Path) -> io::Result<Option<Displacement>> {
         use io::ErrorKind as Kind;
-        let open = self.file.metadata()?;
-        let is_in_place = match fs::symlink_metadata(path) {
-            Ok(named) => (named.dev(), named.ino()) == (open.dev(), open.ino()),
+        let open = FileId::of_file(&self.file)?;
+        let is_in_place = match FileId::of_entry(path) {
+            Ok(named) => named == open,
             Err(error) => match error.kind() {
                 Kind::NotFound | Kind::NotADirectory | Kind::PermissionDenied => false,
                 _ => return Err(error),
             },
         };
         let expected = self.length;
-        Ok(match (is_in_place, open.nlink(), open.len()) {
+        let found = self.file.metadata()?.len();
+        Ok(match (is_in_place, link_count(&self.file)?, found) {
             (true, _, found) => {
                 (found != expected).then_some(Displacement::Resized { expected, found })
             }
@@ -232,7 +224,7 @@ impl LogOutput for FileOutput {
         let length = self.file.metadata()?.len();
         let mut end = vec![0; lines.len().min(usize::try_from(length).unwrap_or(usize::MAX))];
         let end_at = length - end.len() as u64;
-        self.file.read_exact_at(&mut end, end_at)?;
+        read_exact_at(&self.file, &mut end, end_at)?;
         let found = end.split_inclusive(|&byte| byte == b'\n').rev();
         let repeated = found.take_while(|line| written_again.contains(line));
         let length = length - repeated.map(|line| line.len() as u64).sum::<u64>();
@@ -249,7 +241,7 @@ impl LogOutput for FileOutput {
             return Err(io::ErrorKind::FileTooLarge.into());
         }
         let mut end = vec![0; usize::try_from(length).unwrap_or(0)];
-        self.file.read_exact_at(&mut end, from)?;
+        read_exact_at(&self.file, &mut end, from)?;
         let found: HashSet<&[u8]> = end.split_inclusive(|&byte| byte == b'\n').collect();
         let lines = lines.split_inclusive(|&byte| byte == b'\n');
         Ok(lines.filter(|line| !found.contains(line)).collect::<Vec<_>>().concat())

@@ -11,7 +11,7 @@ use std::{
     sync::atomic::{AtomicBool, Ordering},
 };
 
-use rustix::io::Errno;
+use super::platform::{is_unsupported, open_folder};
 
 /// Syncs the content of a file.
 ///
@@ -38,7 +38,7 @@ pub fn sync_folder_of(path: &Path) -> io::Result<()> {
 /// Returns the error of the system, with the exceptions of [`sync_folder_of`].
 pub fn sync_folder(folder: &Path) -> io::Result<()> {
     static REPORTED: AtomicBool = AtomicBool::new(false);
-    let synced = match File::open(folder) {
+    let synced = match open_folder(folder) {
         Ok(folder) => folder.sync_all(),
         // A folder may be writable but not readable.
         Err(error) if error.kind() == io::ErrorKind::PermissionDenied => Ok(()),
@@ -54,7 +54,7 @@ fn unless_unsupported(
     what: &str,
 ) -> io::Result<()> {
     let Err(error) = &outcome else { return outcome };
-    if !error.raw_os_error().is_some_and(is_unsupported) {
+    if !is_unsupported(error) {
         return outcome;
     }
     if !reported.swap(true, Ordering::Relaxed) {
@@ -66,14 +66,10 @@ fn unless_unsupported(
     Ok(())
 }
 
-/// Returns `true` if fsync(2) or flock(2) failed because the file system lacks the operation.
-pub(super) fn is_unsupported(errno: i32) -> bool {
-    let unsupported = [Errno::INVAL, Errno::NOSYS, Errno::OPNOTSUPP, Errno::NOTSUP, Errno::NOTTY];
-    unsupported.iter().any(|known| known.raw_os_error() == errno)
-}
-
 #[cfg(test)]
 mod tests {
+    use rustix::io::Errno;
+
     use super::*;
 
     fn outcome(errno: Errno) -> io::Result<()> {

@@ -3,13 +3,12 @@
 use std::{
     fs::File,
     io,
-    os::unix::fs::FileExt as _,
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
-use sonard_log::{AtomicFile, FINGERPRINT_BYTES, read_small_json, to_hex};
+use sonard_log::{AtomicFile, FINGERPRINT_BYTES, platform::read_exact_at, read_small_json, to_hex};
 
 use super::in_flight::LogPosition;
 
@@ -73,7 +72,7 @@ fn hash_before(folder: &Path, position: &LogPosition) -> io::Result<String> {
     let mut bytes = vec![0; usize::try_from(position.bytes - from).unwrap_or_default()];
     // A damaged file name must not lead out of the folder.
     let name = Path::new(&*position.file).file_name().ok_or(io::ErrorKind::NotFound)?;
-    File::open(folder.join(name))?.read_exact_at(&mut bytes, from)?;
+    read_exact_at(&File::open(folder.join(name))?, &mut bytes, from)?;
     Ok(to_hex(&Sha256::digest(&bytes)))
 }
 

@@ -6,14 +6,14 @@
 //! [`FORCED_END`]: motor and log are still closed.
 #![warn(clippy::expect_used, clippy::indexing_slicing, clippy::panic)]
 
-use std::{fs, fs::File, time::Duration};
+use std::{future::poll_fn, task::Poll, time::Duration};
 
-use rustix::process::Signal as Number;
 use tokio::{
-    signal::unix::{Signal, SignalKind, signal},
     sync::watch,
     time::{Instant, sleep},
 };
+
+use super::platform::{self, StopSignal};
 
 /// Signals within this time of the first one are part of the same request.
 const BURST: Duration = Duration::from_millis(500);
@@ -43,17 +43,8 @@ impl Hangup {
     /// Effect for this process. Must be called before a handler for SIGHUP is installed.
     #[must_use]
     pub fn for_this_process() -> Self {
-        let has_terminal = File::open("/dev/tty").is_ok();
-        if has_terminal && !is_ignored(Number::HUP) { Self::Stop } else { Self::Reload }
+        if platform::ends_with_terminal() { Self::Stop } else { Self::Reload }
     }
-}
-
-/// Returns `true` if this process ignores a signal, by the mask in `/proc/self/status`.
-fn is_ignored(signal: Number) -> bool {
-    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
-    mask.is_some_and(|mask| mask >> (signal.as_raw() - 1) & 1 == 1)
 }
 
 /// Requests for the end of this process, from its signals. Clones share them.
@@ -64,7 +55,7 @@ pub struct Interrupts(watch::Receiver<StopRequest>);
 #[derive(Debug)]
 pub struct SignalHandlers {
     /// The signals that could be handled.
-    streams: Vec<Signal>,
+    streams: Vec<StopSignal>,
     requests: watch::Sender<StopRequest>,
 }
 
@@ -86,11 +77,9 @@ impl Interrupts {
     /// be called within a tokio runtime.
     #[must_use]
     pub fn install(hangup: Hangup) -> (Self, SignalHandlers) {
-        let mut kinds = vec![SignalKind::interrupt(), SignalKind::terminate()];
-        kinds.extend((hangup == Hangup::Stop).then(SignalKind::hangup));
         let (requests, receiver) = watch::channel(StopRequest::default());
         // A signal without a handler ends the process at once, as the system has it.
-        let streams = kinds.into_iter().filter_map(|kind| signal(kind).ok()).collect();
+        let streams = platform::stop_signals(hangup == Hangup::Stop);
         (Self(receiver), SignalHandlers { streams, requests })
     }
 
@@ -149,10 +138,10 @@ impl SignalHandlers {
 }
 
 /// Completes with the next of several signals.
-async fn next_of(streams: &mut [Signal]) {
-    std::future::poll_fn(|context| {
+async fn next_of(streams: &mut [StopSignal]) {
+    poll_fn(|context| {
         let came = streams.iter_mut().any(|stream| stream.poll_recv(context).is_ready());
-        if came { std::task::Poll::Ready(()) } else { std::task::Poll::Pending }
+        if came { Poll::Ready(()) } else { Poll::Pending }
     })
     .await;
 }
@@ -160,13 +149,6 @@ async fn next_of(streams: &mut [Signal]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn ignored_signals_are_recognised() {
-        // The runtime of the standard library ignores it.
-        assert!(is_ignored(Number::PIPE));
-        assert!(!is_ignored(Number::TERM));
-    }
 
     #[tokio::test]
     async fn forced_end_follows_an_orderly_one() {
@@ -178,9 +160,7 @@ mod tests {
         assert!(interrupts.happened());
         let forced = interrupts.wait_forced();
         tokio::pin!(forced);
-        let waiting = std::future::poll_fn(|context| {
-            std::task::Poll::Ready(forced.as_mut().poll(context).is_pending())
-        });
+        let waiting = poll_fn(|context| Poll::Ready(forced.as_mut().poll(context).is_pending()));
         assert!(waiting.await, "an orderly end is not forced");
         sender.send_replace(StopRequest::Forced);
         forced.await;

@@ -11,5 +11,6 @@
 pub mod backoff;
 pub mod interrupts;
 pub mod messages;
+pub mod platform;
 pub mod supervisor;
 pub mod wall_clock;

@@ -9,17 +9,20 @@
 use std::{
     collections::VecDeque,
     io::{self, IsTerminal as _, Write},
-    os::fd::BorrowedFd,
     sync::{Arc, Condvar, Mutex, MutexGuard, OnceLock, PoisonError},
     thread,
     time::{Duration, Instant},
 };
 
-use rustix::{
-    event::{PollFd, PollFlags, Timespec, poll},
-    io::Errno,
+use tracing_subscriber::{
+    Layer as _, Registry,
+    filter::Targets,
+    fmt::{MakeWriter, layer},
+    layer::SubscriberExt as _,
+    util::SubscriberInitExt as _,
 };
-use tracing_subscriber::{EnvFilter, fmt::MakeWriter};
+
+use super::platform::{MAX_ATOMIC_BYTES, Output, stderr, write_before};
 
 /// Upper bound of the queue, bytes.
 const MAX_QUEUED_BYTES: usize = 256 * 1024;
@@ -27,10 +30,8 @@ const MAX_QUEUED_BYTES: usize = 256 * 1024;
 const DRAIN_TIMEOUT: Duration = Duration::from_millis(500);
 /// Time allowed for a message that is written directly.
 const DIRECT_TIMEOUT: Duration = Duration::from_secs(1);
-/// Largest write that does not block once poll(2) reports a pipe as writable, bytes: PIPE_BUF of
-/// Linux.
-const ATOMIC_WRITE_BYTES: usize = 4096;
-/// Level of messages unless `SONARD_LOG` sets another.
+/// Targets and levels of messages unless `SONARD_LOG` sets others, such as
+/// `info,sonard_device=debug`.
 const DEFAULT_FILTER: &str = "info,rustdds=off";
 
 /// Queue of this process's messages, once there is one.
@@ -72,21 +73,7 @@ struct QueueState {
 #[must_use]
 pub fn log_to_stderr() -> MessageGuard {
     let queue = QUEUE.get_or_init(|| MessageQueue::start(stderr())).clone();
-    let filter =
-        EnvFilter::try_from_env("SONARD_LOG").unwrap_or_else(|_| EnvFilter::new(DEFAULT_FILTER));
-    let subscriber = tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(queue.clone())
-        .with_ansi(io::stderr().is_terminal())
-        .log_internal_errors(false)
-        .with_target(false);
-    let installed = if std::env::var_os("JOURNAL_STREAM").is_some() {
-        subscriber.without_time().try_init()
-    } else {
-        subscriber.try_init()
-    };
-    // A subscriber that the caller has installed before is kept.
-    drop(installed);
+    install(queue.clone(), DEFAULT_FILTER, std::env::var_os("JOURNAL_STREAM").is_none());
     // The default hook writes to standard error and would block with it.
     std::panic::set_hook(Box::new(|panic| {
         let place = panic.location().map(ToString::to_string).unwrap_or_default();
@@ -99,17 +86,25 @@ pub fn log_to_stderr() -> MessageGuard {
 /// Sends warnings to standard error, for programs that write their own messages there. `SONARD_LOG`
 /// sets another level.
 pub fn warn_on_stderr() {
-    let filter =
-        EnvFilter::try_from_env("SONARD_LOG").unwrap_or_else(|_| EnvFilter::new("off,sonard=warn"));
-    let subscriber = tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(|| DirectWriter)
+    install(|| DirectWriter, "off,sonard=warn", false);
+}
+
+/// Sends messages that pass `SONARD_LOG`, or else `default_filter`, to a writer. A subscriber that
+/// the caller has installed before is kept.
+fn install<W>(writer: W, default_filter: &str, with_time: bool)
+where
+    W: for<'a> MakeWriter<'a> + Send + Sync + 'static,
+{
+    let requested = std::env::var("SONARD_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
+    // The defaults are valid.
+    let filter = requested.or_else(|| default_filter.parse().ok()).unwrap_or_default();
+    let lines = layer()
+        .with_writer(writer)
         .with_ansi(io::stderr().is_terminal())
         .log_internal_errors(false)
-        .with_target(false)
-        .without_time();
-    // A subscriber that the caller has installed before is kept.
-    drop(subscriber.try_init());
+        .with_target(false);
+    let lines = if with_time { lines.boxed() } else { lines.without_time().boxed() };
+    drop(Registry::default().with(lines).with(filter).try_init());
 }
 
 /// Writes through [`write_stderr`]; never fails.
@@ -130,20 +125,16 @@ impl Write for DirectWriter {
 /// program no longer, and one that is gone is ignored.
 pub fn write_stderr(text: &str) {
     let deadline = Instant::now() + DIRECT_TIMEOUT;
-    for piece in text.as_bytes().chunks(ATOMIC_WRITE_BYTES) {
+    for piece in text.as_bytes().chunks(MAX_ATOMIC_BYTES) {
         if write_before(stderr(), piece, Some(deadline)).is_err() {
             return;
         }
     }
 }
 
-fn stderr() -> BorrowedFd<'static> {
-    rustix::stdio::stderr()
-}
-
 impl MessageQueue {
     /// Starts the thread that writes the messages to `output`.
-    fn start(output: BorrowedFd<'static>) -> Self {
+    fn start(output: Output) -> Self {
         let shared = QueueInner { state: Mutex::default(), changed: Condvar::new() };
         let queue = Self(Arc::new(shared));
         let writer = queue.clone();
@@ -174,7 +165,7 @@ impl MessageQueue {
         self.0.changed.notify_all();
     }
 
-    fn write_messages(&self, output: BorrowedFd<'_>) {
+    fn write_messages(&self, output: Output) {
         loop {
             let written = write_before(output, &self.next_message(), None);
             let mut state = self.state();
@@ -247,43 +238,6 @@ impl MakeWriter<'_> for MessageQueue {
 
     fn make_writer(&self) -> Self {
         self.clone()
-    }
-}
-
-/// Writes all bytes; before a deadline, `bytes` must not be longer than [`ATOMIC_WRITE_BYTES`]. The
-/// standard library's lock on standard error is not taken, since another thread may hold it while
-/// it blocks.
-fn write_before(
-    output: BorrowedFd<'_>,
-    mut bytes: &[u8],
-    deadline: Option<Instant>,
-) -> io::Result<()> {
-    while !bytes.is_empty() {
-        if let Some(deadline) = deadline {
-            wait_writable(output, Some(deadline))?;
-        }
-        match rustix::io::write(output, bytes) {
-            Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
-            Ok(written) => bytes = bytes.get(written..).unwrap_or_default(),
-            Err(Errno::INTR) => {}
-            // Another process may have made the shared descriptor non-blocking.
-            Err(Errno::AGAIN) => wait_writable(output, deadline)?,
-            Err(error) => return Err(error.into()),
-        }
-    }
-    Ok(())
-}
-
-fn wait_writable(output: BorrowedFd<'_>, deadline: Option<Instant>) -> io::Result<()> {
-    loop {
-        let left = deadline.map(|deadline| deadline.saturating_duration_since(Instant::now()));
-        let left = left.and_then(|left| Timespec::try_from(left).ok());
-        match poll(&mut [PollFd::from_borrowed_fd(output, PollFlags::OUT)], left.as_ref()) {
-            Ok(0) => return Err(io::ErrorKind::TimedOut.into()),
-            Ok(_) => return Ok(()),
-            Err(Errno::INTR) => {}
-            Err(error) => return Err(error.into()),
-        }
     }
 }
 

@@ -11,6 +11,8 @@ use std::{
     time::SystemTime,
 };
 
+use super::platform;
+
 /// Present while systemd-timesyncd has set the clock since the start of the computer.
 const SYNCHRONIZED_FILE: &str = "run/systemd/timesync/synchronized";
 /// Folder of systemd-timesyncd, present while it runs.
@@ -23,9 +25,6 @@ const EARLIER_FILES: [&str; 4] = [
     "etc/fake-hwclock.data",
     "proc/self/exe",
 ];
-/// Maximum error of a synchronised clock, microseconds: the limit of systemd's `NTPSynchronized`.
-/// The kernel's flag `STA_UNSYNC` is also set to protect the battery-backed clock.
-const MAX_ERROR_US: libc::c_long = 16_000_000;
 
 /// State of the wall clock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -53,7 +52,7 @@ impl ClockEvidence {
     /// Collects the evidence of this computer.
     #[must_use]
     pub fn collect() -> Self {
-        Self::collect_from(Path::new("/"), kernel_synchronization())
+        Self::collect_from(Path::new("/"), platform::is_clock_synchronized())
     }
 
     /// Collects the evidence from the files below `root`. `kernel` is the kernel's report, if
@@ -81,18 +80,6 @@ impl ClockEvidence {
             None => ClockState::Unknown,
         }
     }
-}
-
-/// Synchronisation as reported by adjtimex(2); `None` where a sandbox rejects it, such as
-/// `ProtectClock=` of systemd.
-fn kernel_synchronization() -> Option<bool> {
-    #[expect(unsafe_code, reason = "no safe wrapper of adjtimex(2) among the dependencies")]
-    // SAFETY: all-zero bytes are a valid `timex`, and with `modes` 0 the call only writes to it.
-    let (state, clock) = unsafe {
-        let mut clock: libc::timex = std::mem::zeroed();
-        (libc::adjtimex(&raw mut clock), clock)
-    };
-    (state >= 0).then_some(clock.maxerror < MAX_ERROR_US)
 }
 
 #[cfg(test)]

@@ -6,16 +6,12 @@
 
 use std::{
     fmt::{self, Write as _},
-    fs::{self, File, OpenOptions},
+    fs::{self, File, OpenOptions, TryLockError},
     io::{self, Read as _, Write as _},
     path::{Path, PathBuf},
     sync::{Mutex, PoisonError},
 };
 
-use rustix::{
-    fs::{FlockOperation, flock},
-    io::Errno,
-};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
 
@@ -118,16 +114,16 @@ impl Checkpoint {
         let options = &mut OpenOptions::new();
         let mut file =
             open_no_follow(options.read(true).append(true).create(true), &path).map_err(fail)?;
-        match flock(&file, FlockOperation::NonBlockingLockExclusive) {
+        match file.try_lock() {
             Ok(()) => {}
-            Err(Errno::WOULDBLOCK) => {
+            Err(TryLockError::WouldBlock) => {
                 let error = format!("{}: another process runs this calibration", path.display());
                 return Err(Failure::input(
                     error,
                     "wait for it, or give another folder with --out",
                 ));
             }
-            Err(error) => return Err(fail(error.into())),
+            Err(TryLockError::Error(error)) => return Err(fail(error)),
         }
         let mut text = Vec::new();
         file.read_to_end(&mut text).map_err(fail)?;

@@ -1,11 +1,11 @@
 //! Interference on the port: other programs, changed settings, an adapter that delays bytes.
 
-use std::{os::fd::AsRawFd, path::PathBuf};
-
-use rustix::{
-    process::{ForeignRawFd, PidfdFlags, PidfdGetfdFlags, getpid, pidfd_getfd, pidfd_open},
-    termios::{ControlModes, InputModes, LocalModes, OutputModes, Termios, tcgetattr},
+use std::{
+    os::fd::{AsRawFd, OwnedFd},
+    path::PathBuf,
 };
+
+use rustix::termios::{ControlModes, InputModes, LocalModes, OutputModes, Termios, tcgetattr};
 
 use super::{
     foreign_sender::{ForeignSender, quote},
@@ -17,19 +17,13 @@ use crate::link::{self, Holders};
 pub(super) struct PortMonitor {
     path: PathBuf,
     /// Open port with its settings after opening; `None` if the kernel does not report them.
-    settings: Option<(std::os::fd::OwnedFd, Termios)>,
+    settings: Option<(OwnedFd, Termios)>,
 }
 
 impl PortMonitor {
     /// Records the settings of a port opened as `line`.
     pub(super) fn new(port: &str, line: &impl AsRawFd) -> Self {
-        // `line` exposes its descriptor only as a number, which the kernel duplicates.
-        let duplicate = |number| {
-            let process = pidfd_open(getpid(), PidfdFlags::empty()).ok()?;
-            pidfd_getfd(process, number, PidfdGetfdFlags::empty()).ok()
-        };
-        let number: ForeignRawFd = line.as_raw_fd();
-        let settings = duplicate(number).and_then(|line| {
+        let settings = link::duplicate(line).ok().and_then(|line| {
             let settings = tcgetattr(&line).ok()?;
             Some((line, settings))
         });

@@ -91,7 +91,7 @@ mod tests {
         };
         let given = given.map(|text| text.parse().expect("a part"));
         let (part, note) = determine(given, &variable, 8).map_err(|failure| match failure {
-            Failure::Input(report) => report.to_string(),
+            Failure::Input(diagnostic) => diagnostic.to_string(),
             other => panic!("{other:?}"),
         })?;
         Ok(note.map_or_else(|| part.to_string(), |note| format!("{part}: {note}")))

@@ -180,7 +180,7 @@ fn pretty(value: &Value) -> String {
 fn checked(port: &str) -> Result<String, String> {
     doctor::check_without_motion(port).map_err(|failure| match failure {
         Failure::Found(text) => text.unwrap_or_default(),
-        Failure::Input(report) | Failure::Device(report) => report.to_string(),
+        Failure::Input(diagnostic) | Failure::Device(diagnostic) => diagnostic.to_string(),
     })
 }
 

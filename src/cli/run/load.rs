@@ -14,12 +14,8 @@ use super::{
     files::{Files, digests},
 };
 use crate::{
-    cli::{
-        Failure,
-        array::{load_array, load_course},
-        options::load_sensor,
-        scene_file, socket,
-    },
+    array::RobotCourse,
+    cli::{Failure, array::load_array, options::load_sensor, scene_file, socket},
     config::{ConfigError, ConfigLayers, Keys, Mode, robot_name_from_host},
     daemon::{ArraySimulation, OptionalOutputs, Settings, SettingsConflict},
     host_gpio,
@@ -268,13 +264,28 @@ pub(in crate::cli) fn file_and_environment(config: Option<&Path>) -> Result<Conf
     layers.with_environment(variables).map_err(|error| failure_from(&error))
 }
 
+/// Loads a course from a file of poses.
+fn load_course(path: &Path) -> Result<RobotCourse, Failure> {
+    let name = path.display();
+    let text = fs::read_to_string(path).map_err(|error| {
+        Failure::input(
+            format!("cannot read the poses {name}: {error}"),
+            "give a text file with one pose per line: {\"x_m\": 1.0, \"y_m\": 2.0, \"heading_deg\": 90.0}",
+        )
+    })?;
+    RobotCourse::from_json_lines(&text).map_err(|error| {
+        let message = format!("{name}:{}: {}", error.line, error.message);
+        Failure::input(message, "correct that line")
+    })
+}
+
 /// Formats a failure on one line.
 pub(in crate::cli) fn one_line(failure: &Failure) -> String {
     match failure {
         Failure::Found(text) => text.clone().unwrap_or_default(),
-        Failure::Input(report) | Failure::Device(report) => match report.help() {
-            Some(help) => format!("{report}; {help}"),
-            None => report.to_string(),
+        Failure::Input(diagnostic) | Failure::Device(diagnostic) => match diagnostic.help() {
+            "" => diagnostic.to_string(),
+            help => format!("{diagnostic}; {help}"),
         },
     }
 }

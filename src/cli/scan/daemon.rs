@@ -6,7 +6,8 @@ use crate::{
     cli::{
         Failure, Outcome,
         daemon::{check_scene, failure_from, scans_failure},
-        runtime::{self, Interrupts},
+        interruptible,
+        runtime::Interrupts,
     },
     client::RequestedScans,
     geometry::Pose,
@@ -21,7 +22,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let output = Output::open(args.out.as_deref())?;
     let mut scans =
         Scans { output, count: args.repeat, ends: Vec::new(), reported_repeats: 0, pose, plan };
-    let measured = runtime::run_interruptible(async |interrupts| {
+    let measured = interruptible::run_interruptible(async |interrupts| {
         let status: Status =
             client.get_json("/v1/status").await.map_err(|error| failure_from(&error))?;
         check_scene(status.scene.as_ref(), &scene)?;

@@ -7,8 +7,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// Device majors of pseudo-terminals.
-const PTS_MAJORS: std::ops::Range<u32> = 136..144;
+use crate::platform::pseudo_terminal_index;
+
 /// Maximum displayed length of a command line, characters.
 const MAX_COMMAND_CHARS: usize = 60;
 
@@ -139,16 +139,17 @@ impl Holder {
 /// Identity of a device node among open files.
 struct PortNode {
     device: u64,
-    /// File system of a pseudo-terminal: every devpts instance numbers its terminals from 0.
-    devpts: Option<u64>,
+    /// File system and number of a pseudo-terminal: every devpts instance numbers its terminals
+    /// from 0.
+    devpts: Option<(u64, u32)>,
 }
 
 impl PortNode {
     fn at(path: &Path) -> Option<Self> {
         let metadata = fs::metadata(path).ok()?;
         let device = metadata.rdev();
-        let is_pts = PTS_MAJORS.contains(&rustix::fs::major(device));
-        Some(Self { device, devpts: is_pts.then(|| metadata.dev()) })
+        let index = pseudo_terminal_index(device);
+        Some(Self { device, devpts: index.map(|index| (metadata.dev(), index)) })
     }
 
     /// # Errors
@@ -164,7 +165,7 @@ impl PortNode {
             is_held |= is_device_path(&target)
                 && fs::metadata(file.path()).is_ok_and(|metadata| {
                     metadata.rdev() == self.device
-                        && self.devpts.is_none_or(|devpts| devpts == metadata.dev())
+                        && self.devpts.is_none_or(|(devpts, _)| devpts == metadata.dev())
                 });
         }
         Ok(is_held)
@@ -172,13 +173,13 @@ impl PortNode {
 
     /// Returns `true` for the master of the pseudo-terminal.
     fn is_other_end(&self, process: &Path, file: &OsStr, target: &Path) -> io::Result<bool> {
-        if self.devpts.is_none() || target.file_name().is_none_or(|name| name != "ptmx") {
+        let Some((_, own)) = self.devpts else { return Ok(false) };
+        if target.file_name().is_none_or(|name| name != "ptmx") {
             return Ok(false);
         }
         let info = fs::read_to_string(process.join("fdinfo").join(file))?;
         let index = info.lines().find_map(|line| line.strip_prefix("tty-index:"));
-        let index = index.and_then(|index| index.trim().parse().ok());
-        Ok(index == Some(rustix::fs::minor(self.device)))
+        Ok(index.and_then(|index| index.trim().parse().ok()) == Some(own))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Enumeration of the serial ports of this computer from sysfs and udev, without opening any.
+//! Enumeration of the serial ports of this computer, without opening any.
 
 use std::{
     fs, io,
@@ -6,6 +6,7 @@ use std::{
 };
 
 use super::{LinkError, PortListError, holders::real_path};
+use crate::platform::{SystemPort, UsbDevice, serial_ports};
 
 /// Serial port of this computer, described without opening it.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
@@ -43,20 +44,6 @@ pub(super) struct PortFolders<'a> {
     pub(super) by_id: &'a Path,
     /// Folder of device nodes.
     pub(super) dev: &'a Path,
-}
-
-/// Serial port as described by sysfs.
-#[derive(Debug)]
-struct SystemPort {
-    path: PathBuf,
-    usb: Option<UsbDevice>,
-}
-
-#[derive(Debug)]
-struct UsbDevice {
-    manufacturer: Option<String>,
-    product: Option<String>,
-    serial: Option<String>,
 }
 
 impl PortFolders<'static> {
@@ -152,41 +139,10 @@ impl PortFolders<'_> {
     }
 
     fn ports(&self) -> Result<Vec<SystemPort>, PortListError> {
-        let entries = read_folder(self.tty).map_err(|error| PortListError::new(self.tty, error))?;
-        let mut ports: Vec<SystemPort> =
-            entries.iter().filter_map(|entry| self.port(entry)).collect();
+        let ports = serial_ports(self.tty, self.dev);
+        let mut ports = ports.map_err(|error| PortListError::new(self.tty, error))?;
         ports.sort_by(|a, b| a.path.cmp(&b.path));
         Ok(ports)
-    }
-
-    /// Reads the port of a sysfs folder; `None` for consoles, pseudo-terminals and unpopulated
-    /// UART slots.
-    fn port(&self, entry: &Path) -> Option<SystemPort> {
-        let path = self.dev.join(entry.file_name()?);
-        if !path.exists() {
-            return None;
-        }
-        if file_name(entry).starts_with("rfcomm") {
-            return Some(SystemPort { path, usb: None });
-        }
-        let device = fs::canonicalize(entry.join("device")).ok()?;
-        let is_unpopulated = attribute(entry, "type").is_some_and(|kind| kind == "0");
-        let subsystem = file_name(&fs::canonicalize(device.join("subsystem")).ok()?);
-        match subsystem.as_str() {
-            _ if is_unpopulated => None,
-            "usb" | "usb-serial" => Some(SystemPort { usb: usb_device(&device), path }),
-            "amba" | "pci" | "pnp" | "platform" | "serial-base" => {
-                Some(SystemPort { path, usb: None })
-            }
-            _ => None,
-        }
-    }
-}
-
-impl UsbDevice {
-    fn describe(self) -> String {
-        let parts = [self.manufacturer, self.product, self.serial];
-        parts.into_iter().flatten().collect::<Vec<_>>().join(" ")
     }
 }
 
@@ -195,21 +151,6 @@ fn id_of(ids: &[PathBuf], path: &Path) -> Option<String> {
     let device = fs::canonicalize(path).ok()?;
     let id = ids.iter().find(|id| fs::canonicalize(id).is_ok_and(|path| path == device))?;
     Some(file_name(id))
-}
-
-/// Reads the USB device of an interface from its parent folders.
-fn usb_device(interface: &Path) -> Option<UsbDevice> {
-    let device = interface.ancestors().find(|folder| folder.join("idVendor").exists())?;
-    Some(UsbDevice {
-        manufacturer: attribute(device, "manufacturer"),
-        product: attribute(device, "product"),
-        serial: attribute(device, "serial"),
-    })
-}
-
-fn attribute(folder: &Path, name: &str) -> Option<String> {
-    let text = fs::read_to_string(folder.join(name)).ok()?;
-    Some(text.trim().to_owned()).filter(|text| !text.is_empty())
 }
 
 /// Returns the only device among paths; several names of the same device count once.

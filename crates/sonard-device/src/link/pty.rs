@@ -12,9 +12,11 @@ use std::{
 
 use rustix::{
     fs::{Mode, OFlags},
-    pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt},
+    pty::{grantpt, ptsname, unlockpt},
     termios::{OptionalActions, tcgetattr, tcsetattr},
 };
+
+use crate::platform::{is_pseudo_terminal, open_terminal_pair};
 
 /// Both ends of a pty, and an optional symbolic link to it.
 #[derive(Debug)]
@@ -32,7 +34,7 @@ impl Pty {
     /// # Errors
     /// Any system error; `AlreadyExists` if `link` exists and is not a link left by a mock.
     pub fn open(link: Option<&Path>) -> io::Result<Self> {
-        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
+        let master = open_terminal_pair()?;
         grantpt(&master)?;
         unlockpt(&master)?;
         let name = ptsname(&master, Vec::new())?;
@@ -128,7 +130,7 @@ fn create_link(link: &Path, target: &Path) -> io::Result<()> {
 }
 
 fn leads_to_terminal(link: &Path) -> bool {
-    fs::read_link(link).is_ok_and(|to| to.starts_with("/dev/pts"))
+    fs::read_link(link).is_ok_and(|to| is_pseudo_terminal(&to))
 }
 
 #[cfg(test)]

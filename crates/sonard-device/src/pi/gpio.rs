@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use rppal::gpio::{Gpio, InputPin, OutputPin, Trigger};
 use rustix::time::{ClockId, clock_gettime};
 use thiserror::Error;
 
 use super::pins::{BoardOutput, Pins};
+use crate::platform::gpio::{self, Gpio, InputPin, OutputPin, Trigger};
 
 /// Nanoseconds per tick.
 const TICK_NS: u64 = 500;
@@ -59,7 +59,7 @@ pub enum GpioError {
     Permission(String),
     /// Any other error of the GPIO library.
     #[error("cannot use the pins: {0}")]
-    Other(rppal::gpio::Error),
+    Other(gpio::Error),
 }
 
 impl GpioError {
@@ -79,11 +79,11 @@ impl GpioError {
     }
 }
 
-impl From<rppal::gpio::Error> for GpioError {
-    fn from(error: rppal::gpio::Error) -> Self {
+impl From<gpio::Error> for GpioError {
+    fn from(error: gpio::Error) -> Self {
         match error {
-            rppal::gpio::Error::UnknownModel => Self::NotAPi,
-            rppal::gpio::Error::PermissionDenied(path) => Self::Permission(path),
+            gpio::Error::UnknownModel => Self::NotAPi,
+            gpio::Error::PermissionDenied(path) => Self::Permission(path),
             error => Self::Other(error),
         }
     }

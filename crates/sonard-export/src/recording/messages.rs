@@ -37,6 +37,14 @@ struct ChannelState {
 
 /// Size of a chunk, which is held in memory and compressed as a whole.
 const CHUNK_BYTES: u64 = 1 << 20;
+/// Compression of chunks. The `mcap` crate compresses by a library in C.
+const COMPRESSION: Option<Compression> = {
+    #[cfg(feature = "lz4")]
+    let compression = Some(Compression::Lz4);
+    #[cfg(not(feature = "lz4"))]
+    let compression = None;
+    compression
+};
 
 const LIBRARY: &str = "sonard ";
 
@@ -55,7 +63,7 @@ impl<W: Write> RecordingWriter<W> {
         let options = WriteOptions::new()
             .profile("ros2")
             .library(format!("{LIBRARY}{}", env!("CARGO_PKG_VERSION")))
-            .compression(Some(Compression::Lz4))
+            .compression(COMPRESSION)
             .chunk_size(Some(CHUNK_BYTES))
             .disable_seeking(true);
         Ok(Self {

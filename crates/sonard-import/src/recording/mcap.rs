@@ -13,6 +13,7 @@ use mcap::{
     sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions},
 };
 
+use lz4_flex::frame::FrameDecoder;
 use ruzstd::decoding::StreamingDecoder;
 
 use crate::ImportError;
@@ -23,8 +24,9 @@ pub(crate) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 /// Maximum size of a record and of a decompressed chunk.
 const MAX_BYTES: u64 = 1 << 28;
 
-/// Compression preferred by ROS 2 recorders and by `mcap`.
+/// Names of the compressions that the format defines.
 const ZSTD: &str = "zstd";
+const LZ4: &str = "lz4";
 
 /// Size of a chunk's head without the name of its compression: three 8-byte numbers, a checksum,
 /// and the lengths of name and records.
@@ -85,15 +87,10 @@ impl<R: Read> MessageReader<'_, R> {
         if header.uncompressed_size > MAX_BYTES {
             return Err(files.damaged(&"a chunk is too long"));
         }
-        let plain;
-        let chunk = if header.compression == ZSTD {
-            plain = decompress_zstd(&header, &data).map_err(|error| files.damaged(&error))?;
-            &plain
-        } else {
-            // Head and records of the chunk; padding may follow.
-            let end = CHUNK_HEAD + header.compression.len() + header.compressed_size as usize;
-            body.get(..end).unwrap_or(&body)
-        };
+        let plain = decompress(&header, &data).map_err(|error| files.damaged(&error))?;
+        // Head and records of the chunk; padding may follow.
+        let end = CHUNK_HEAD + header.compression.len() + header.compressed_size as usize;
+        let chunk = plain.as_deref().unwrap_or(body.get(..end).unwrap_or(&body));
         let mut take = |record: Record<'_>| self.pending.extend(channels.take(record, self.types));
         for_each_record(chunk, header.uncompressed_size as usize, &mut take)
             .map_err(|error| files.unpacked(error))?;
@@ -118,13 +115,26 @@ impl<R: Read> Iterator for MessageReader<'_, R> {
     }
 }
 
-/// Decompresses a Zstandard chunk.
+/// Returns a compressed chunk as an uncompressed one, `None` for other compressions than
+/// Zstandard and LZ4.
 ///
-/// The Rust decoder is used because that of the `mcap` crate needs a C library.
+/// Decoders in Rust are used because those of the `mcap` crate need C libraries.
 ///
 /// # Errors
 /// Returns an error for invalid data, or if the decompressed length differs from the chunk's head.
-fn decompress_zstd(header: &ChunkHeader, data: &[u8]) -> io::Result<Vec<u8>> {
+fn decompress(header: &ChunkHeader, data: &[u8]) -> io::Result<Option<Vec<u8>>> {
+    match header.compression.as_str() {
+        ZSTD => {
+            let decoder = StreamingDecoder::new(data).map_err(io::Error::other)?;
+            uncompressed_chunk(header, decoder).map(Some)
+        }
+        LZ4 => uncompressed_chunk(header, FrameDecoder::new(data)).map(Some),
+        _ => Ok(None),
+    }
+}
+
+/// Builds an uncompressed chunk from the records that `decoder` returns.
+fn uncompressed_chunk(header: &ChunkHeader, decoder: impl Read) -> io::Result<Vec<u8>> {
     let length = header.uncompressed_size;
     let mut body = Vec::with_capacity(CHUNK_HEAD + length as usize);
     for number in [header.message_start_time, header.message_end_time, length] {
@@ -133,7 +143,6 @@ fn decompress_zstd(header: &ChunkHeader, data: &[u8]) -> io::Result<Vec<u8>> {
     body.extend(header.uncompressed_crc.to_le_bytes());
     body.extend(0_u32.to_le_bytes()); // empty name of the compression
     body.extend(length.to_le_bytes());
-    let decoder = StreamingDecoder::new(data).map_err(io::Error::other)?;
     // Reading one more byte than stated detects longer data.
     let unpacked = decoder.take(length + 1).read_to_end(&mut body)?;
     if unpacked as u64 == length {

@@ -1,17 +1,18 @@
 //! Shard under construction in a hidden folder.
 
 use std::{
-    fs::{self, File, Permissions},
+    fs::{self, File},
     io,
-    os::unix::fs::PermissionsExt as _,
     path::Path,
 };
 
-use rustix::fs::{FlockOperation, flock};
 use tempfile::{Builder, TempDir};
 
 use super::DataSetError;
-use crate::sync_folder;
+use crate::{
+    platform::{open_folder, with_mode},
+    sync_folder,
+};
 
 /// Mode of a new folder, reduced by the umask.
 const MODE: u32 = 0o777;
@@ -30,15 +31,13 @@ impl ShardDraft {
     /// Creates and locks a draft for the shard of this name.
     pub(super) fn create(root: &Path, shard: &str) -> Result<Self, DataSetError> {
         let fail = |error| DataSetError::io("create a folder in", root, error);
-        let folder = Builder::new()
-            .prefix(&format!(".{shard}."))
-            .suffix(SUFFIX)
-            .permissions(Permissions::from_mode(MODE))
-            .tempdir_in(root)
-            .map_err(fail)?;
-        let lock = File::open(folder.path()).map_err(fail)?;
+        let prefix = format!(".{shard}.");
+        let mut names = Builder::new();
+        names.prefix(&prefix).suffix(SUFFIX);
+        let folder = with_mode(&mut names, MODE).tempdir_in(root).map_err(fail)?;
+        let lock = open_folder(folder.path()).map_err(fail)?;
         // On a file system without locks, drafts of killed processes are not removed.
-        let _ = flock(&lock, FlockOperation::NonBlockingLockExclusive);
+        let _ = lock.try_lock();
         Ok(Self { folder, _lock: lock })
     }
 
@@ -74,7 +73,7 @@ impl ShardDraft {
 
 /// Removes a folder unless a process has locked it.
 fn remove_unlocked(path: &Path) -> io::Result<()> {
-    let lock = File::open(path)?;
-    flock(&lock, FlockOperation::NonBlockingLockExclusive)?;
+    let lock = open_folder(path)?;
+    lock.try_lock()?;
     fs::remove_dir_all(path)
 }

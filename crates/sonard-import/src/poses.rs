@@ -1,4 +1,4 @@
-//! Parser of poses from operators, files and programs. Pure.
+//! Poses of planned scans, from operators, files and programs.
 
 use std::{collections::BTreeMap, fmt};
 
@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use sonard_model::{geometry::Pose, scene::Scene};
 
-use super::keys::Conditions;
+/// Conditions recorded with a scan: name and value.
+pub type Conditions = Map<String, Value>;
 
 /// Pose of a collection, with optional name and conditions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,0 +1,91 @@
+#!/bin/sh
+# Installs sonard for this user, without root and without a compiler:
+#
+#   sh install.sh --from URL|FOLDER    where SHA256SUMS and the archives of a release are [default: this script's folder]
+#   sh install.sh --prefix FOLDER      installation folder [default: ~/.local]
+#   sh install.sh --uninstall          removes what was installed
+#
+# The archive is selected by system, processor and C library, and its SHA-256 digest is verified before unpacking.
+set -eu
+version=@VERSION@
+# Oldest glibc of the programs that are linked against it.
+glibc_minor=31
+
+fail() { printf 'install.sh: %s\n' "$*" >&2; exit 1; }
+
+from=$(dirname "$0") prefix=${HOME:?}/.local action=install
+while [ $# != 0 ]; do
+  case $1 in
+  --from) from=${2:?--from: where?} && shift 2 ;;
+  --prefix) prefix=${2:?--prefix: where?} && shift 2 ;;
+  --uninstall) action=uninstall && shift ;;
+  -h | --help) sed -n '2,8s/^# \{0,1\}//p' "$0" && exit ;;
+  *) fail "unknown option $1" ;;
+  esac
+done
+list=$prefix/share/sonard/installed
+
+# Removes the files of the list, and the folders that are empty then.
+uninstall() {
+  [ -r "$list" ] || fail "nothing is installed in $prefix"
+  while read -r file; do rm -f "$prefix/$file"; done <"$list"
+  folders=$(while read -r file; do
+    while [ "$file" != "${file%/*}" ]; do file=${file%/*} && printf '%s\n' "$file"; done
+  done <"$list" | sort -ur)
+  rm -f "$list"
+  for folder in $folders share/sonard share; do rmdir "$prefix/$folder" 2>/dev/null || true; done
+}
+
+# fetch NAME FILE: copies a file of the release.
+fetch() {
+  case $from in
+  http://* | https://*)
+    if command -v curl >/dev/null; then
+      curl --fail --silent --show-error --location --output "$2" "${from%/}/$1"
+    else
+      wget -q -O "$2" "${from%/}/$1" || fail "cannot fetch $1; install curl or wget"
+    fi
+    ;;
+  *) cp "$from/$1" "$2" ;;
+  esac || fail "no $1 in $from"
+}
+
+# Prints the processor and C library, as the archives' names have them.
+target() {
+  system=$(uname -s)
+  [ "$system" = Linux ] || fail "there is no program for $system: build it from source (docs/install.md)"
+  case $(uname -m) in
+  x86_64 | amd64) processor=x86_64 ;;
+  aarch64 | arm64) processor=aarch64 ;;
+  *) fail "there is no program for $(uname -m): build it from source (docs/install.md)" ;;
+  esac
+  library=musl
+  minor=$(getconf GNU_LIBC_VERSION 2>/dev/null | sed -n 's/^glibc 2\.\([0-9]*\).*/\1/p')
+  if [ "${minor:-0}" -ge "$glibc_minor" ] && grep -q -- "-$processor-unknown-linux-gnu.tar.gz" "$work/SHA256SUMS"; then
+    library=gnu
+  fi
+  printf '%s-unknown-linux-%s' "$processor" "$library"
+}
+
+install() {
+  work=$(mktemp -d)
+  trap 'rm -rf "$work"' EXIT
+  fetch SHA256SUMS "$work/SHA256SUMS"
+  name=sonard-$version-$(target)
+  fetch "$name.tar.gz" "$work/$name.tar.gz"
+  expected=$(sed -n "s/  $name\\.tar\\.gz\$//p" "$work/SHA256SUMS")
+  found=$(sha256sum "$work/$name.tar.gz")
+  [ -n "$expected" ] && [ "${found%% *}" = "$expected" ] || fail "the digest of $name.tar.gz is not that of SHA256SUMS"
+  tar -x -z -f "$work/$name.tar.gz" -C "$work"
+  if [ -r "$list" ]; then uninstall; fi
+  mkdir -p "$prefix/share/sonard"
+  (cd "$work/$name" && find . -type f | sed 's|^\./||' | sort) >"$list"
+  cp -R "$work/$name/." "$prefix/"
+  printf 'installed %s in %s\n' "$name" "$prefix"
+  case :$PATH: in
+  *:"$prefix/bin":*) ;;
+  *) printf 'add it to the path: export PATH="%s/bin:$PATH"\n' "$prefix" ;;
+  esac
+}
+
+$action

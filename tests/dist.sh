@@ -1,0 +1,165 @@
+#!/usr/bin/env bash
+# Installs a release as users do, without a compiler: runs README's first command, uninstalls, and looks for residue.
+# Prints one row of a table for each way.
+#
+#   tests/dist.sh                   the release that `cargo xtask dist` has built
+#   tests/dist.sh PROGRAM [WHEEL]   archives that are packed around this program and wheel, which takes no release build
+#
+# Ways whose artefact or tool is missing are LEFT OUT, and named. Needs root for the bare systems.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+. packaging/debian.sh
+target=$(realpath "${CARGO_TARGET_DIR:-target}")
+work=$(mktemp -d)
+trap 'rm -rf --one-file-system "$work"' EXIT
+fail() { printf 'tests/dist.sh: %s\n' "$*" >&2; exit 1; }
+rows=$work/rows
+row() { printf '| %-44s | %-34s | %7s | %5s | %-4s |\n' "$@" >>"$rows"; }
+leave_out() { row "$1" "untested: $2" - - -; }
+scan=(scan --mock --scene simple-room --pose fig9 --out out/fig9)
+machine=$(uname -m)
+
+pack() {
+  dist=$work/dist
+  strip -o "$work/sonard" "$1"
+  local wheel=()
+  if [ -n "${2:-}" ]; then wheel=(--wheel "$2"); fi
+  cargo xtask dist --only binary,installer,sbom"${2:+,wheel}" --target "$machine-unknown-linux-gnu" \
+    --program "$work/sonard" "${wheel[@]}" --out "$dist" >/dev/null
+}
+
+# timed COMMAND...: seconds that it takes, into `took`.
+timed() {
+  local began=$EPOCHREALTIME
+  "$@" >"$work/said" 2>&1 || fail "$*: $(cat "$work/said")"
+  took=$(awk "BEGIN { printf \"%.1f\", $EPOCHREALTIME - $began }")
+}
+megabytes() { du --bytes --total "$@" | tail -n 1 | awk '{ printf "%.1f", $1 / 1e6 }'; }
+
+# within ROOT COMMAND...: runs a command in a root with terminals, apart from this system's mounts.
+within() {
+  unshare --mount --fork bash -c '
+    mkdir -p "$1/dev/pts" "$1/proc"
+    mount -t proc proc "$1/proc"
+    mount -t devpts -o newinstance,ptmxmode=0666,mode=620 devpts "$1/dev/pts"
+    [ -e "$1/dev/ptmx" ] || ln -s pts/ptmx "$1/dev/ptmx"
+    exec chroot "$@"' bash "$@"
+}
+
+# A user without root installs in a Debian without a compiler.
+try_installer() {
+  local platform="Debian $(. /etc/os-release && echo "$VERSION_CODENAME"), $machine" root=$work/debian archive
+  new_debian "$root"
+  ! chroot "$root" sh -c 'command -v cc || command -v cargo' || fail "the bare Debian has a compiler"
+  cp -r "$dist" "$root/dist"
+  chroot "$root" useradd --create-home user
+  chroot "$root" find /home/user | sort >"$work/before"
+  archive=$(find "$dist" -name "*-$machine-unknown-linux-gnu.tar.gz")
+  cat >"$root/first.sh" <<END
+set -eu
+cd && export HOME=\$PWD
+sh /dist/install.sh --from /dist
+PATH=\$HOME/.local/bin:\$PATH
+sonard ${scan[*]}
+END
+  timed within "$root" setpriv --reuid user --regid user --clear-groups env HOME=/home/user sh /first.sh
+  [ -s "$root/home/user/out/fig9/scan.png" ] || fail "no picture: $(cat "$work/said")"
+  row "$platform" "install.sh, then the first scan" "$took" "$(megabytes "$archive")" no
+  chroot "$root" setpriv --reuid user --regid user --clear-groups env HOME=/home/user \
+    sh -c 'rm -r "$HOME/out" && sh /dist/install.sh --uninstall && rmdir "$HOME/.local" 2>/dev/null || true'
+  chroot "$root" find /home/user | sort | diff "$work/before" - || fail "uninstalling leaves files"
+  # A changed archive is rejected.
+  printf x >>"$root/dist/$(basename "$archive")"
+  if chroot "$root" env HOME=/home/user sh /dist/install.sh --from /dist >"$work/said" 2>&1; then
+    fail "a changed archive is installed"
+  fi
+  grep -q 'digest' "$work/said" || fail "$(cat "$work/said")"
+}
+
+# A root with nothing but the static program.
+try_static() {
+  local platform="no C library, no shell, $machine" archive root=$work/static
+  archive=$(find "$dist" -name "*-$machine-unknown-linux-musl.tar.gz")
+  if [ -z "$archive" ]; then leave_out "$platform" "no static program is built"; return; fi
+  mkdir -p "$root/dev" "$root/tmp"
+  tar --extract --file "$archive" --directory "$root" --strip-components 2 --wildcards '*/bin/sonard'
+  timed within "$root" /sonard "${scan[@]}"
+  [ -s "$root/out/fig9/scan.png" ] || fail "no picture: $(cat "$work/said")"
+  row "$platform" "the program alone" "$took" "$(megabytes "$archive")" no
+}
+
+# A fresh environment of Python that takes packages from a folder.
+try_wheel() {
+  local platform="Python $(python3 -c 'import platform; print(platform.python_version())'), $machine" wheel
+  wheel=$(find "$dist" -name "sonard-*$machine.whl" ! -name '*musllinux*')
+  if [ -z "$wheel" ]; then leave_out "$platform" "no wheel is built"; return; fi
+  mkdir "$work/index"
+  cp "$wheel" "$work/index"
+  python3 -m venv "$work/venv"
+  "$work/venv/bin/pip" download --quiet --disable-pip-version-check --dest "$work/index" 'numpy>=1.23'
+  find "$work/venv" -name __pycache__ -prune -o -print | sort >"$work/before"
+  cat >"$work/wheel.sh" <<END
+set -e
+cd "$work"
+venv/bin/pip install --quiet --disable-pip-version-check --no-index --find-links index sonard
+venv/bin/sonard ${scan[*]}
+END
+  timed bash "$work/wheel.sh"
+  [ -s "$work/out/fig9/scan.png" ] || fail "no picture: $(cat "$work/said")"
+  (cd "$work" && venv/bin/python -c 'import sonard; sonard.Scene.shipped("simple-room")') || fail "the Python package"
+  row "$platform" "pip install sonard, then the first scan" "$took" "$(megabytes "$work"/index/*)" no
+  "$work/venv/bin/pip" uninstall --quiet --yes --disable-pip-version-check sonard numpy
+  find "$work/venv" -name __pycache__ -prune -o -print | sort | diff "$work/before" - || fail "uninstalling leaves files"
+}
+
+# qemu-user 7.2 hangs when a program of Rust starts a thread, so only verbs without threads run.
+try_aarch64() {
+  local platform="aarch64 in qemu-user" archive
+  archive=$(find "$dist" -name "*-aarch64-unknown-linux-musl.tar.gz")
+  if [ -z "$archive" ]; then leave_out "$platform" "no program for aarch64 is built"; return; fi
+  command -v qemu-aarch64 >/dev/null || tests/install.sh "" qemu-user
+  mkdir "$work/aarch64"
+  tar --extract --file "$archive" --directory "$work/aarch64" --strip-components 2 --wildcards '*/bin/sonard'
+  timed timeout 60 qemu-aarch64 "$work/aarch64/sonard" scene check scenes/simple-room.json
+  row "$platform" "scene check, which starts no thread" "$took" "$(megabytes "$archive")" no
+}
+
+# Nothing tells where, by whom and when the artefacts were built.
+look_for_traces() {
+  local trace file
+  rm -rf "$work/traces"
+  for file in "$dist"/*.tar.gz; do
+    case $file in *-source.tar.gz) continue ;; esac
+    mkdir -p "$work/traces"
+    tar --extract --file "$file" --directory "$work/traces"
+    for trace in "$PWD" "$target" "${CARGO_HOME:-$HOME/.cargo}" "$(uname -n)"; do
+      if grep -rqF -- "$trace" "$work/traces"; then fail "$(basename "$file") contains $trace"; fi
+    done
+    rm -rf "$work/traces"
+  done
+}
+
+is_release=
+case $# in
+0) dist=$target/dist is_release=1 ;;
+*) pack "$@" ;;
+esac
+[ -e "$dist/SHA256SUMS" ] || fail "no release in $dist: cargo xtask dist"
+(cd "$dist" && sha256sum --quiet --check SHA256SUMS)
+# Programs of tests have paths of this computer in their debug information.
+if [ -n "$is_release" ]; then look_for_traces; fi
+if [ "$(id -u)" = 0 ] && unshare --mount true 2>/dev/null; then
+  try_installer
+  try_static
+else
+  leave_out "bare Debian, root with the program alone" "needs root and mounts"
+fi
+try_wheel
+try_aarch64
+row 'macOS, Windows' 'untested: linted only' - - -
+head_of_table() {
+  printf '| %-44s | %-34s | %7s | %5s | %-4s |\n' platform command seconds MB root
+  printf '| --- | --- | ---: | ---: | --- |\n'
+}
+head_of_table
+cat "$rows"

@@ -1,0 +1,70 @@
+//! Wheels with the Python package and the program, one for each processor and C library.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use crate::{
+    Failure,
+    command::run,
+    release::Release,
+    tools::{Tools, add_target},
+};
+
+/// Builds a wheel for each target. The program in it is linked statically, for both C libraries.
+///
+/// # Errors
+/// A failed build.
+pub(crate) fn build_all(release: &Release) -> Result<(), Failure> {
+    let tools = Tools::install(&release.target)?;
+    for target in &release.targets {
+        let program = release.build_program(&target.replace("-gnu", "-musl"))?;
+        let work = release.work_folder("wheel")?;
+        let wheel = match &release.wheel {
+            Some(wheel) => wheel.clone(),
+            None => build(release, &tools, target, &work)?,
+        };
+        add_program(release, &tools, &wheel, &program)?;
+    }
+    Ok(())
+}
+
+/// Builds the wheel of the Python package into `work`.
+fn build(release: &Release, tools: &Tools, target: &str, work: &Path) -> Result<PathBuf, Failure> {
+    add_target(target)?;
+    let mut build = Command::new(tools.program("maturin"));
+    build.args(["build", "--release", "--locked", "--quiet", "--zig", "--target", target]);
+    build.args(["--compatibility", compatibility(target)]);
+    build.args(["--manifest-path", "python/Cargo.toml", "--out"]).arg(work);
+    release.set_environment(&mut build)?;
+    build.env("PATH", tools.search_path());
+    run(build.env("CARGO_TARGET_DIR", release.target.join("python")))?;
+    Ok(fs::read_dir(work)?.next().ok_or("no wheel was built")??.path())
+}
+
+/// Adds the program to a wheel, as a script that `pip` puts on the path.
+fn add_program(
+    release: &Release,
+    tools: &Tools,
+    wheel: &Path,
+    program: &Path,
+) -> Result<(), Failure> {
+    let folder = release.work_folder("unpacked")?;
+    let mut unpack = Command::new(tools.program("wheel"));
+    run(unpack.args(["unpack", "--dest"]).arg(&folder).arg(wheel))?;
+    let package = fs::read_dir(&folder)?.next().ok_or("an empty wheel")??;
+    let data = format!("{}.data/scripts", package.file_name().to_string_lossy());
+    let scripts = package.path().join(data);
+    fs::create_dir_all(&scripts)?;
+    fs::copy(program, scripts.join("sonard"))?;
+    let mut pack = Command::new(tools.program("wheel"));
+    release.set_environment(&mut pack)?;
+    run(pack.args(["pack", "--dest-dir"]).arg(&release.dist).arg(package.path()))
+}
+
+/// Platform of the wheel: the oldest C library that the package is linked against.
+fn compatibility(target: &str) -> &'static str {
+    if target.ends_with("-gnu") { "manylinux2014" } else { "musllinux_1_2" }
+}
