@@ -253,10 +253,10 @@ impl Model {
     /// pose : array_like, shape (3,)
     ///     x and y (metres) and heading (degrees), which matters only if the scene contains a
     ///     robot's body.
-    /// min_amplitude : float
-    ///     Minimum amplitude of the paths, 0.000001 to 1, relative to a head-on, perfect wall.
-    ///     Paths that touch cylinders more than once, or a cylinder and an edge, are listed from
-    ///     ten times this amplitude.
+    /// min_amplitude : float, optional
+    ///     Minimum amplitude of the paths, 0.000001 to 1, relative to a head-on, perfect wall. By
+    ///     default 0.001, and 0.01 for paths that touch cylinders more than once, or a cylinder and
+    ///     an edge, and are longer than the blanking covers.
     ///
     /// Returns
     /// -------
@@ -264,11 +264,11 @@ impl Model {
     ///     A path that can be traversed in both directions is listed twice, with departure and
     ///     arrival swapped. The amplitude excludes the beam pattern: it is the echo of a ranger
     ///     that faces the path.
-    #[pyo3(signature = (pose, min_amplitude = 0.001))]
+    #[pyo3(signature = (pose, min_amplitude = None))]
     fn paths<'py>(
         &self,
         pose: &Bound<'py, PyAny>,
-        min_amplitude: f64,
+        min_amplitude: Option<f64>,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         single::paths(self, pose, min_amplitude)
     }

@@ -41,11 +41,11 @@ pub(super) struct Args {
     /// Maximum number of mirror reflections on a path; unlimited by default
     #[arg(long, value_name = "N")]
     max_order: Option<u32>,
-    /// Minimum amplitude of listed paths; a head-on, perfect wall gives 1. Paths with more than one
-    /// cylinder, or a cylinder and an edge, are listed from ten times this amplitude if they are
-    /// longer than the blanking covers
-    #[arg(long, value_name = "A", default_value_t = 0.001)]
-    min_amplitude: f64,
+    /// Minimum amplitude of listed paths; a head-on, perfect wall gives 1. By default 0.001, and 0.01
+    /// for paths with more than one cylinder, or a cylinder and an edge, that are longer than the
+    /// blanking covers
+    #[arg(long, value_name = "A")]
+    min_amplitude: Option<f64>,
     /// Edge diffraction model, instead of the sensor's or utd
     #[arg(long, value_enum, value_name = "LAW")]
     edge_law: Option<EdgeLawKind>,
@@ -102,9 +102,9 @@ struct PathLine {
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
-    if !(1e-6..=1.0).contains(&args.min_amplitude) {
+    if let Some(amplitude) = args.min_amplitude.filter(|it| !(1e-6..=1.0).contains(it)) {
         return Err(Failure::input(
-            format!("--min-amplitude is {}", args.min_amplitude),
+            format!("--min-amplitude is {amplitude}"),
             "give a number from 0.000001 to 1",
         ));
     }
@@ -123,10 +123,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let scene = Arc::new(scene.with_robot_at(&pose));
     let simulator = Simulator::new(scene, args.sensor.sensor()?, args.air.air()?, options)
         .map_err(|error| Failure::input(error, "see `sonard paths --help`"))?;
-    let settings = crate::model::paths::PathSettings {
-        floor: args.min_amplitude,
-        ..simulator.path_settings()
-    };
+    let settings = simulator.path_settings().listing(args.min_amplitude);
     let paths = Paths::new(simulator.scene(), settings);
     let [transmitter, receiver] = match args.azimuth_deg {
         None => [pose.position(); 2],

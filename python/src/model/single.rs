@@ -28,19 +28,18 @@ pub(super) fn reading<'py>(
 pub(super) fn paths<'py>(
     model: &Model,
     given: &Bound<'py, PyAny>,
-    min_amplitude: f64,
+    min_amplitude: Option<f64>,
 ) -> PyResult<Vec<Bound<'py, PyAny>>> {
     let py = given.py();
-    if !(1e-6..=1.0).contains(&min_amplitude) {
+    if let Some(amplitude) = min_amplitude.filter(|it| !(1e-6..=1.0).contains(it)) {
         return Err(PyValueError::new_err(format!(
-            "min_amplitude is {min_amplitude}: it must be from 0.000001 to 1"
+            "min_amplitude is {amplitude}: it must be from 0.000001 to 1"
         )));
     }
     let pose = model.checked(given)?;
     let simulator = model.simulator_at(py, &pose)?;
     let found = py.detach(|| {
-        let settings =
-            model_paths::PathSettings { floor: min_amplitude, ..simulator.path_settings() };
+        let settings = simulator.path_settings().listing(min_amplitude);
         let paths = model_paths::Paths::new(simulator.scene(), settings);
         paths.visit_between(pose.position(), pose.position(), |echoes| {
             echoes.map(|echo| PathResult::from_echo(simulator.scene(), &echo)).collect::<Vec<_>>()

@@ -10,6 +10,8 @@ use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 use num_complex::Complex64;
 
+pub use images::LitImages;
+use images::WedgeImage;
 pub use post::{MAX_KA, Post};
 pub use strip::{MAX_WAVELENGTHS, Strip};
 pub use view::EdgeView;
@@ -65,7 +67,10 @@ impl EdgeLaw {
     pub fn echo(&self, wedge: &Wedge, aspect: &Aspect, wave_number_per_m: f64) -> Complex64 {
         let range_m = 2.0 * aspect.distance_m;
         let level = match *self {
-            Self::Utd => return wedge.uniform(aspect, aspect, wave_number_per_m),
+            Self::Utd => {
+                let lit = wedge.lit_images(aspect);
+                return self.echo_beside(wedge, aspect, lit, wave_number_per_m);
+            }
             Self::KucSiegel => kuc_siegel(range_m, TAU / wave_number_per_m),
             Self::BozmaKuc { sigma, far_field_m } => bozma_kuc(range_m, sigma, far_field_m),
         };
@@ -74,6 +79,21 @@ impl EdgeLaw {
         }
         let [first, second] = wedge.reflectance;
         Complex64::from(level * (first * second).sqrt())
+    }
+
+    /// Field diffracted by the edge as [`Self::echo`] returns it, for a search that found the images
+    /// `lit`. Laws without an aspect ignore them.
+    pub(crate) fn echo_beside(
+        &self,
+        wedge: &Wedge,
+        aspect: &Aspect,
+        lit: LitImages,
+        wave_number_per_m: f64,
+    ) -> Complex64 {
+        match self {
+            Self::Utd => wedge.uniform(aspect, aspect, lit, wave_number_per_m),
+            _ => self.echo(wedge, aspect, wave_number_per_m),
+        }
     }
 
     /// Returns `true` if a wedge has an echo under this law.
@@ -110,14 +130,9 @@ pub fn bozma_kuc(range_m: f64, sigma: f64, far_field_m: f64) -> f64 {
 }
 
 /// Tolerance for an opening of `pi / m`, radians. Scenes hold decimal coordinates, whose rounding
-/// errors are about 1e-14.
-const REGULAR_RAD: f64 = 1e-10;
-
-/// Angle over which an edge fades towards an opening without diffraction, radians.
-const FADE_RAD: f64 = 0.1;
-
-/// Tolerance of a boundary, radians; on the boundary the edge counts as lit.
-const ON_BOUNDARY_RAD: f64 = 1e-9;
+/// errors are about 1e-14. At 50 m the images of such a corner are within a nanometre of one, so
+/// that a search for mirror images finds each of them.
+const REGULAR_RAD: f64 = 1e-11;
 
 impl Wedge {
     /// Returns `true` if mirror images alone are the exact field: an opening of `pi / m` (flat
@@ -152,19 +167,24 @@ impl Wedge {
     /// the edge, without multiple diffraction between near edges.
     ///
     /// Between `from` and `aspect` the coefficient is continued without its jumps at image
-    /// boundaries: it complements the images as visible from `from`. With both arguments equal it
+    /// boundaries: it complements the images that are `lit` at `from`. With both arguments equal it
     /// is the coefficient itself.
-    fn uniform(&self, aspect: &Aspect, from: &Aspect, wave_number_per_m: f64) -> Complex64 {
+    fn uniform(
+        &self,
+        aspect: &Aspect,
+        from: &Aspect,
+        lit: LitImages,
+        wave_number_per_m: f64,
+    ) -> Complex64 {
         if self.is_regular() {
             return Complex64::ZERO;
         }
         let n = self.opening_rad / PI;
         let kl = wave_number_per_m * aspect.distance_m;
-        let sum: Complex64 = self
-            .images(aspect, from)
-            .iter()
-            .map(|image| image.reflectance * image.cotangent_term(n, kl))
-            .sum();
+        let term = |(image, is_lit): (&WedgeImage, bool)| {
+            image.reflectance * image.cotangent_term(n, kl, is_lit)
+        };
+        let sum: Complex64 = self.images(aspect, from).iter().zip(lit.0).map(term).sum();
         -Complex64::cis(-FRAC_PI_4) / (2.0 * n * (TAU * kl).sqrt()) * sum
     }
 
@@ -181,89 +201,6 @@ impl Wedge {
             image.reflectance * far.min(0.5)
         };
         self.images(aspect, aspect).iter().map(share).sum()
-    }
-
-    /// The images with the nearest boundaries on each side of `from`, for the source and its first
-    /// image.
-    fn images(&self, aspect: &Aspect, from: &Aspect) -> [WedgeImage; 4] {
-        let difference = [aspect, from].map(|at| at.out_rad - at.in_rad);
-        let sum = [aspect, from].map(|at| at.out_rad + at.in_rad);
-        let [direct_low, direct_high] =
-            self.pair(difference, [-self.opening_rad, self.opening_rad], false);
-        let [mirrored_low, mirrored_high] = self.pair(sum, [0.0, 2.0 * self.opening_rad], true);
-        [direct_low, direct_high, mirrored_low, mirrored_high]
-    }
-
-    /// Two adjacent images at an angle `here`, with visibility evaluated at `there`, for angles
-    /// within `air`.
-    ///
-    /// Towards an opening of `pi / m` the boundary of one image leaves the air where the other's
-    /// enters, and both images coincide. The strength of the image with the outside boundary, which
-    /// has no physical meaning there, is therefore faded to the strength of the other.
-    fn pair(&self, [here, there]: [f64; 2], air: [f64; 2], mirrored: bool) -> [WedgeImage; 2] {
-        let turn = 2.0 * self.opening_rad;
-        let mut outside = [0.0; 2];
-        let mut images = [1.0, -1.0].map(|side| {
-            let count = ((PI + side * there) / turn).round();
-            let past_rad = |beta: f64| PI + side * beta - count * turn;
-            let boundary = side * (count * turn - PI);
-            outside[usize::from(side < 0.0)] = (air[0] - boundary).max(boundary - air[1]);
-            WedgeImage {
-                past_rad: past_rad(here),
-                is_lit: past_rad(there) > -ON_BOUNDARY_RAD,
-                reflectance: self.image_reflectance((side * count) as i32, mirrored),
-            }
-        });
-        let own = [images[0].reflectance, images[1].reflectance];
-        for (at, image) in images.iter_mut().enumerate() {
-            if outside[at] > -ON_BOUNDARY_RAD && outside[1 - at] <= ON_BOUNDARY_RAD {
-                let share = (outside[at] / FADE_RAD).clamp(0.0, 1.0);
-                image.reflectance = own[1 - at] + share * (own[at] - own[1 - at]);
-                break;
-            }
-        }
-        images
-    }
-
-    /// Product of the reflectances for the image at `2 number opening +- in_rad` (minus: mirrored).
-    fn image_reflectance(&self, number: i32, mirrored: bool) -> f64 {
-        let [first, second] = self.reflectance;
-        let pairs = (first * second).powi(number.abs() - i32::from(mirrored && number > 0));
-        match (mirrored, number) {
-            (false, _) => pairs,
-            (true, 1..) => pairs * second,
-            (true, _) => pairs * first,
-        }
-    }
-}
-
-/// Mirror image of the source in the wedge.
-struct WedgeImage {
-    /// Angle of the receiver past the boundary of the image's lit region, positive on the lit side,
-    /// radians.
-    past_rad: f64,
-    /// Visibility: the image counts as visible.
-    is_lit: bool,
-    /// Product of the reflectances.
-    reflectance: f64,
-}
-
-impl WedgeImage {
-    /// Cotangent term `cot((pi +- beta) / 2n) F(k L a(beta))`, with its limit on the boundary
-    /// (equations 25, 33).
-    fn cotangent_term(&self, n: f64, kl: f64) -> Complex64 {
-        let side = if self.is_lit { 1.0 } else { -1.0 };
-        if self.past_rad.abs() < ON_BOUNDARY_RAD {
-            return side * n * (TAU * kl).sqrt() * Complex64::cis(FRAC_PI_4);
-        }
-        let x = kl * 2.0 * (self.past_rad / 2.0).sin().powi(2);
-        let cotangent = (self.past_rad / (2.0 * n)).tan().recip();
-        let term = transition(x) * cotangent;
-        if (self.past_rad > 0.0) == self.is_lit {
-            return term;
-        }
-        // Beyond the boundary: Fresnel integral from the opposite end.
-        term + side * 2.0 * (PI * x).sqrt() * cotangent.abs() * Complex64::cis(FRAC_PI_4 + x)
     }
 }
 
@@ -298,6 +235,7 @@ fn transition_fraction(x: f64, ix: Complex64) -> Complex64 {
     2.0 * ix / (2.0 * ix + 1.0 - rest)
 }
 
+mod images;
 pub(crate) mod post;
 mod strip;
 mod view;

@@ -45,7 +45,7 @@ impl SearchPart {
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error(
     "too many echo paths, most of them {}: reduce max-range (currently {} m), set or reduce max-order{}, \
-     raise the threshold or `weakest`, or remove objects that cannot matter",
+     raise the threshold or min-amplitude, or remove objects that cannot matter",
     part.description(), max_path_m / 2.0,
     if *double_diffraction { ", disable double-diffraction" } else { "" }
 )]

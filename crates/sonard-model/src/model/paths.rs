@@ -124,4 +124,6 @@ pub(super) use crosstalk::{CrosstalkPaths, TransducerPose};
 pub use engine::PathEngine;
 pub use interactions::EchoPath;
 pub use prepare::Paths;
-pub use settings::{DEFAULT_REPEATED_CONTACT_RATIO, PathSettings, default_sensor_z_m};
+pub use settings::{
+    DEFAULT_MIN_AMPLITUDE, DEFAULT_REPEATED_CONTACT_RATIO, PathSettings, default_sensor_z_m,
+};

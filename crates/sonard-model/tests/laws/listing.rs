@@ -165,6 +165,27 @@ fn lower_floor_only_adds() {
     }
 }
 
+/// With one floor for all paths, a listing is the stronger part of a longer one.
+#[test]
+fn amplitude_filters_the_listing() {
+    let crowd = Kind { partitions: 1, strips: 0, rounds: 4, ..FURNISHED };
+    for (kind, name) in
+        [(WITH_LEGS, "filter"), (WITH_LEGS_PAIR, "filter pair"), (crowd, "filter crowd")]
+    {
+        on_random_worlds(name, kind, |world, random| {
+            let of = |min_amplitude: f64| {
+                let max_path_m = 3.0;
+                PathSettings { max_path_m, ..settings() }.listing(Some(min_amplitude))
+            };
+            let low = of(0.02);
+            let high = of(low.floor * 10_f64.powf(random.random_range(0.0..1.5)));
+            let mut all = world.echoes(&low);
+            all.retain(|echo| echo.amplitude >= high.floor);
+            assert_same(&world.echoes(&high), &all, &high, AS_IS);
+        });
+    }
+}
+
 #[test]
 fn higher_order_only_adds() {
     for (kind, name) in [

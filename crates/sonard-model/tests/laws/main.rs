@@ -7,6 +7,7 @@ mod compare;
 mod energy;
 mod heights;
 mod listing;
+mod nearly;
 mod paths_are_real;
 mod rough;
 mod symmetry;

@@ -1,4 +1,4 @@
-use super::*;
+use super::{images::ON_BOUNDARY_RAD, *};
 
 const C: f64 = 343.2;
 const K: f64 = TAU * 49_400.0 / C;
@@ -178,9 +178,11 @@ fn transition_matches_its_integral() {
 fn near_the_end() -> EdgeView {
     let (range_m, offset_m) = (0.6, 0.006_f64);
     let aspect_rad = PI / 2.0 - (offset_m / range_m).asin();
+    let aspect = back(range_m, aspect_rad.to_degrees());
     EdgeView {
         wedge: half_plane(),
-        aspect: back(range_m, aspect_rad.to_degrees()),
+        aspect,
+        lit: half_plane().lit_images(&aspect),
         wave_number_per_m: K,
         legs_m: [range_m; 2],
         swapped: [false; 2],

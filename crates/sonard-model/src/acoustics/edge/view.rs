@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::{Aspect, Wedge};
+use super::{Aspect, LitImages, Wedge};
 
 /// Edge echo as a function of position on a face that is not small compared with the boundary
 /// regions.
@@ -17,6 +17,8 @@ pub struct EdgeView {
     pub wedge: Wedge,
     /// Aspect from the middle of the face and back.
     pub aspect: Aspect,
+    /// Images that are visible from the middle of the face.
+    pub lit: LitImages,
     /// Wave number `2 pi f / c`, radians per metre.
     pub wave_number_per_m: f64,
     /// Distances from the face to the edge and from the edge to the face, metres.
@@ -31,8 +33,9 @@ impl EdgeView {
     /// facing the direction of departure and of arrival.
     pub fn relative_field(&self) -> impl Fn(f64, f64) -> Complex64 + use<> {
         let view = *self;
-        let field =
-            move |aspect: &Aspect| view.wedge.uniform(aspect, &view.aspect, view.wave_number_per_m);
+        let field = move |aspect: &Aspect| {
+            view.wedge.uniform(aspect, &view.aspect, view.lit, view.wave_number_per_m)
+        };
         let middle = field(&view.aspect);
         move |sent_m, received_m| {
             if middle == Complex64::ZERO {

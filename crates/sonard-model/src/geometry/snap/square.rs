@@ -3,6 +3,7 @@
 use smallvec::SmallVec;
 
 use super::{
+    ROUNDING_M,
     joints::Joints,
     vertices::{SegmentEnd, Vertices},
 };
@@ -43,7 +44,8 @@ struct InnerVertex {
 }
 
 /// Squares corners of two sides where a move of 0.1 mm or less suffices. A side extends over
-/// collinear segments, so that the subdivision of a wall is irrelevant.
+/// collinear segments, so that the subdivision of a wall is irrelevant; its joints are moved onto
+/// its line.
 ///
 /// A rotated corner rounded to a tenth of a millimetre may have 90.003 degrees. The difference is
 /// inaudible but changes the mirror images: above 90 degrees no ray returns via both walls, below
@@ -51,7 +53,6 @@ struct InnerVertex {
 pub(super) fn square_up(vertices: &mut Vertices, joints: &Joints, max_move_m: f64) {
     let max_move_m = max_move_m.min(MAX_MOVE_M);
     let (corners, inner) = sides(vertices, joints);
-    let mut is_moved = false;
     for _ in 0..MAX_ROUNDS {
         let off = |corner: &SideCorner| {
             let at = vertices.at[corner.vertex as usize];
@@ -63,14 +64,16 @@ pub(super) fn square_up(vertices: &mut Vertices, joints: &Joints, max_move_m: f6
         if moves.is_empty() {
             break;
         }
-        is_moved = true;
         for (vertex, off) in moves {
             vertices.at[vertex as usize] += SHARE * off;
         }
     }
-    for InnerVertex { vertex, ends, share } in inner.iter().filter(|_| is_moved) {
+    for InnerVertex { vertex, ends, share } in &inner {
         let [a, b] = ends.map(|end| vertices.at[end as usize]);
-        vertices.at[*vertex as usize] = a.lerp(b, *share);
+        let (at, straight) = (&mut vertices.at[*vertex as usize], a.lerp(b, *share));
+        if at.distance(straight) > ROUNDING_M {
+            *at = straight;
+        }
     }
 }
 

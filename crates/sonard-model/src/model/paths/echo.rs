@@ -2,7 +2,7 @@
 //! mechanism's own record of the path.
 
 use super::tolerance::{SAME_M, SAME_RAD};
-use crate::{geometry::DVec2, reading::PathKind};
+use crate::{acoustics::edge::LitImages, geometry::DVec2, reading::PathKind};
 
 /// An echo path before the beam pattern.
 #[derive(Debug, Clone, Copy)]
@@ -33,8 +33,8 @@ pub(crate) enum Via {
     /// Mirror reflections at walls alone; the node of the tree of beams at which the ray ends.
     Walls { node: u32 },
     /// Diffraction at one upright edge; `out` and `back` number the rays to it from transmitter and
-    /// receiver.
-    Edge { point: u32, out: u32, back: u32 },
+    /// receiver, and `lit` are the edge's mirror images that other echoes contain.
+    Edge { point: u32, out: u32, back: u32, lit: LitImages },
     /// Diffraction at two upright edges.
     Edges { double: u32 },
     /// Reflection at cylinders; the connection in the middle of the path.

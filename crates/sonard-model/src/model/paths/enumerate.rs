@@ -147,7 +147,9 @@ impl Paths {
         traced.out.sort_by_edge();
         traced.back.iter_mut().for_each(Rays::sort_by_edge);
         let (out, back) = (&traced.out, traced.back.as_ref());
-        echoes.extend(single::echoes(&self.plan, law, out, back));
+        let mirrored = single::Mirrored::new(echoes);
+        let found = single::echoes(&self.plan, law, out, back, &mirrored);
+        echoes.extend(found);
         let (found, paths) = double::echoes(&self.plan, &self.edge_to_edge, law, out, back);
         echoes.extend(found);
         traced.double = paths;

@@ -187,7 +187,7 @@ impl Paths {
                 self.out_and_back([(there, out), (here, back)], middle)
             }
             Via::Edges { double } => self.by_two_edges(traced, &traced.double[double as usize]),
-            Via::Edge { point, out, back } => {
+            Via::Edge { point, out, back, .. } => {
                 let Some(middle) = self.upright_diffractor(point) else { return Contacts::new() };
                 let rays = [(there, there.to_edge(out)), (here, here.to_edge(back))];
                 self.out_and_back(rays, middle)

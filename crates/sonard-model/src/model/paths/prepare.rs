@@ -91,8 +91,8 @@ fn plan(
     let round = circles.iter().filter(|circle| circle.radius_m > 0.0);
     let extra: Vec<_> =
         round.flat_map(|c| [c.center - c.radius_m, c.center + c.radius_m]).collect();
-    // From outside the box no echo is short enough.
-    let margin_m = 0.5 * settings.max_path_m + 1.0;
+    // From outside the box no path to a wall and on to any receiver is short enough.
+    let margin_m = settings.max_path_m + 1.0;
     let mesh = Mesh::new(&arrangement, heights.stacked(&arrangement), &extra, margin_m);
     let wall = |number: usize| {
         let ((a, b), gain) = (segments[number], gains[number]);

@@ -7,6 +7,9 @@ use crate::acoustics::edge::EdgeLaw;
 /// 20 dB.
 pub const DEFAULT_REPEATED_CONTACT_RATIO: f64 = 10.0;
 
+/// Default minimum amplitude of listed paths, relative to a head-on, rigid wall.
+pub const DEFAULT_MIN_AMPLITUDE: f64 = 0.001;
+
 /// Limits of the path search, and the physics along paths.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PathSettings {
@@ -53,6 +56,17 @@ pub fn default_sensor_z_m(floor_z_m: Option<f64>, ceiling_z_m: Option<f64>) -> f
 }
 
 impl PathSettings {
+    /// Returns the settings of a listing of all paths from an amplitude upwards. By default it is
+    /// [`DEFAULT_MIN_AMPLITUDE`], times [`DEFAULT_REPEATED_CONTACT_RATIO`] where the search limits
+    /// the number of contacts.
+    #[must_use]
+    pub fn listing(self, min_amplitude: Option<f64>) -> Self {
+        match min_amplitude {
+            Some(floor) => Self { floor, repeated_contact_ratio: 1.0, ..self },
+            None => Self { floor: DEFAULT_MIN_AMPLITUDE, ..self },
+        }
+    }
+
     pub(crate) fn allows(&self, order: u16) -> bool {
         self.max_order.is_none_or(|bound| order <= bound)
     }

@@ -33,6 +33,35 @@ impl World {
         Self { walls, ..self.clone() }
     }
 
+    /// Splits every wall in two pieces, with the joint up to a nanometre off the wall's line.
+    pub(crate) fn split_off_line(&self, random: &mut Pcg64) -> Self {
+        let mut walls = Vec::new();
+        for wall in &self.walls {
+            let [a, b] = wall.ends;
+            let off_m = 10_f64.powf(random.random_range(-13.0..-9.0));
+            let off_m = if random.random() { off_m } else { -off_m };
+            let joint =
+                a.lerp(b, random.random_range(0.1..0.9)) + off_m * (b - a).normalize().perp();
+            walls.extend([[a, joint], [joint, b]].map(|ends| Wall { ends, ..*wall }));
+        }
+        Self { walls, ..self.clone() }
+    }
+
+    /// Replaces the room by a rectangle around it.
+    pub(crate) fn with_right_angles(mut self) -> Self {
+        let along = (self.walls[0].ends[1] - self.walls[0].ends[0]).normalize();
+        let inside = |wall: &Wall| wall.ends.map(|end| DVec2::new(along.x, -along.y).rotate(end));
+        let corners = || self.walls[..4].iter().flat_map(inside);
+        let low = corners().reduce(DVec2::min).expect("four walls");
+        let high = corners().reduce(DVec2::max).expect("four walls");
+        let corners = [low, DVec2::new(high.x, low.y), high, DVec2::new(low.x, high.y)];
+        let corners = corners.map(|corner| along.rotate(corner));
+        for (at, wall) in self.walls[..4].iter_mut().enumerate() {
+            wall.ends = [corners[at], corners[(at + 1) % 4]];
+        }
+        self
+    }
+
     /// Reorders the walls and swaps their ends.
     pub(crate) fn reordered(&self, random: &mut Pcg64) -> Self {
         let mut world = self.clone();

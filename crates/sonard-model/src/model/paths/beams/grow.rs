@@ -30,17 +30,20 @@ impl Beams {
     pub(crate) fn grow(plan: &TracingPlan, start: DVec2, target: DVec2) -> Self {
         let Some(mesh) = &plan.mesh else { return Self::in_the_open(plan, start, target) };
         let triangles = || Some((mesh.locate(start)?, mesh.locate(target)?));
-        let Some((first, home)) = triangles() else { return Self::default() };
+        let Some((first, home)) = triangles() else {
+            return Self::in_the_open(plan, start, target);
+        };
         Grower::new(plan, mesh, start, target, home).grow(first)
     }
 
-    /// Beams of a scene that has no walls or cylinders, only perhaps floor and ceiling.
+    /// Beams of a scene that has no walls or cylinders within reach, only perhaps floor and ceiling.
     fn in_the_open(plan: &TracingPlan, start: DVec2, target: DVec2) -> Self {
         let run = target - start;
         let (gain, node, order, slopes) = (1.0, ROOT, 0, ALL_SLOPES);
         let departure = run.normalize_or_zero();
         let straight = UnfoldedRay { run, departure, gain, node, order, slopes };
-        let is_listed = plan.settings.direct && run != DVec2::ZERO;
+        let is_in_reach = run != DVec2::ZERO && run.length() <= plan.settings.max_path_m;
+        let is_listed = plan.settings.direct && is_in_reach;
         let to_receiver = is_listed.then_some(straight).into_iter().collect();
         Self { to_receiver, ..Self::default() }
     }

@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 
 use super::{posts::PlanPost, strips::PlanStrip};
 use crate::{
-    acoustics::edge::{Aspect, EdgeLaw, Post, Strip, Wedge},
+    acoustics::edge::{Aspect, EdgeLaw, LitImages, Post, Strip, Wedge},
     geometry::{Arrangement, DVec2},
     model::{Diffractor, Edge, paths::tolerance::TIE_M},
 };
@@ -220,6 +220,21 @@ impl PlanCorner {
             Some(WholeScatterer::Strip(strip)) => strip.echo(aspect),
             Some(WholeScatterer::Post(post)) => post.echo(aspect),
             None => law.echo(&self.sectors[sector].wedge, aspect, k),
+        }
+    }
+
+    /// Diffracted field beside the images `lit`; see [`EdgeLaw::echo_beside`].
+    pub(crate) fn echo_beside(
+        &self,
+        law: EdgeLaw,
+        sector: usize,
+        aspect: &Aspect,
+        lit: LitImages,
+        k: f64,
+    ) -> Complex64 {
+        match self.whole {
+            Some(_) => self.echo(law, sector, aspect, k),
+            None => law.echo_beside(&self.sectors[sector].wedge, aspect, lit, k),
         }
     }
 

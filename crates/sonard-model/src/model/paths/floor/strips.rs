@@ -10,8 +10,10 @@ use crate::{
     geometry::{Arrangement, DVec2, signed_angle_rad},
 };
 
-/// Bend within which consecutive pieces of a wall are one, radians.
+/// Bend, radians, and offset of a joint from the line, metres, within either of which consecutive
+/// pieces of a wall are one.
 const STRAIGHT_RAD: f64 = 1e-6;
+const STRAIGHT_M: f64 = 1e-8;
 
 /// A narrow strip in the floor plan.
 #[derive(Debug)]
@@ -60,6 +62,13 @@ pub(crate) fn extract_strips(
     strips.into_iter().map(add).collect()
 }
 
+/// Returns `true` if a piece of a wall continues another one.
+fn is_straight(before: DVec2, after: DVec2) -> bool {
+    let off_m = before.perp_dot(after).abs() / (before + after).length();
+    let bend_rad = signed_angle_rad(before, after).abs();
+    bend_rad <= STRAIGHT_RAD || before.dot(after) > 0.0 && off_m <= STRAIGHT_M
+}
+
 /// Collinear chains of pieces from one free end to another.
 struct Chains<'a> {
     plan: &'a Arrangement,
@@ -97,8 +106,7 @@ impl<'a> Chains<'a> {
             };
             let far = self.other_end(next, at);
             let so_far = self.position(at) - self.position(point);
-            let bend_rad = signed_angle_rad(so_far, self.position(far) - self.position(at));
-            if bend_rad.abs() > STRAIGHT_RAD {
+            if !is_straight(so_far, self.position(far) - self.position(at)) {
                 return None;
             }
             pieces.push(next);
