@@ -6,6 +6,8 @@ use crate::line::Line;
 
 /// Minimum distance between a cut of a line by itself and any other cut, metres.
 const MIN_PIECE_M: f64 = 0.02;
+/// Distance within which walls are joined, metres.
+pub(crate) const JOINED_M: f64 = 0.004;
 /// Minimum length of a wall, metres.
 const MIN_WALL_M: f64 = 0.004;
 /// Distance of cuts beside the feet of perpendiculars, metres.
@@ -205,25 +207,17 @@ impl LineArrangement {
         Segment { line: run.line, a, b }
     }
 
-    /// Index of the cut of `line` at its crossing with the line that makes a cut of another one.
-    pub(crate) fn crossing(&self, line: usize, at: usize) -> Option<(usize, usize)> {
-        let cut = self.cuts[line][at];
-        let other = cut.by?;
+    /// Returns `true` if the line that makes a cut has a wall there, within [`JOINED_M`]: several
+    /// lines may cross almost in one point.
+    pub(crate) fn is_met(&self, walls: &PieceSet, line: usize, cut: usize) -> bool {
+        let cut = self.cuts[line][cut];
+        let Some(other) = cut.by else { return false };
         let along_m = self.lines[other].along_m(self.lines[line].at(cut.along_m));
         let cuts = &self.cuts[other];
-        let nearest = (0..cuts.len()).min_by(|a, b| {
-            let off = |at: &usize| (cuts[*at].along_m - along_m).abs();
-            off(a).total_cmp(&off(b))
-        })?;
-        Some((other, nearest))
-    }
-
-    /// Returns `true` if the line that makes a cut has a wall there.
-    pub(crate) fn is_met(&self, walls: &PieceSet, line: usize, cut: usize) -> bool {
-        self.crossing(line, cut).is_some_and(|(other, at)| {
-            (at > 0 && self.is_wall(walls, other, at - 1))
-                || (at < self.pieces_of(other) && self.is_wall(walls, other, at))
-        })
+        let first = cuts.partition_point(|cut| cut.along_m < along_m - JOINED_M);
+        let after = cuts.partition_point(|cut| cut.along_m <= along_m + JOINED_M);
+        let pieces = first.saturating_sub(1)..after.min(self.pieces_of(other));
+        pieces.into_iter().any(|at| self.is_wall(walls, other, at))
     }
 
     /// Walls of another arrangement on the lines of this one that are nearest to theirs.

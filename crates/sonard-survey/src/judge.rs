@@ -14,7 +14,7 @@ use sonard_model::{
 };
 
 use crate::{
-    arrangement::{LineArrangement, PieceSet, Segment},
+    arrangement::{JOINED_M, LineArrangement, PieceSet, Segment},
     readings::{Outcome, Readings},
     workspace::Workspace,
 };
@@ -29,8 +29,6 @@ const WALL_NATS: f64 = 4.0;
 const FREE_END_NATS: f64 = 2.0;
 /// Price of the length of walls, nats per metre.
 const LENGTH_NATS_PER_M: f64 = 0.5;
-/// Distance at which an end of a wall meets another wall, metres.
-const JOINED_M: f64 = 0.004;
 /// Score of a plan with more paths than the model follows.
 const UNSCORED: f64 = -1e9;
 

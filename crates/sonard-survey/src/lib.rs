@@ -35,7 +35,8 @@ mod result;
 mod search;
 mod slam;
 mod survey;
-
+#[cfg(test)]
+mod tests;
 mod trace;
 mod workspace;
 

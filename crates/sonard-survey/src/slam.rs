@@ -44,10 +44,15 @@ pub(crate) fn virtual_map<'a>(arcs: &'a [Vec<Arc>], start: Pose, moves: &[Move])
         return VirtualMap { poses: Vec::new(), features, covariance: None };
     };
     features.extend(first.iter().flat_map(|arc| suggested(arc, &start)));
-    for (at, step) in moves.iter().enumerate().take(arcs.len().saturating_sub(1)) {
-        let guess = step.from(&poses[at]);
-        let spans = [SPAN_SIGMAS * step.sigma_m + 0.01, SPAN_SIGMAS * step.sigma_deg + 1.0];
-        poses.push(search_pose(&features, &arcs[at + 1], &guess, spans));
+    for at in 0..arcs.len() - 1 {
+        let next = &arcs[at + 1];
+        poses.push(match moves.get(at) {
+            Some(step) => {
+                let spans = [SPAN_SIGMAS * step.sigma_m + 0.01, SPAN_SIGMAS * step.sigma_deg + 1.0];
+                search_pose(&features, next, &step.from(&poses[at]), spans).0
+            }
+            None => search_everywhere(&features, next, &poses[at]),
+        });
         let known: Vec<&Arc> = arcs[..at + 2].iter().flatten().collect();
         features = associate(&features, &known, &poses, GATE_M[0]);
         let mut owned = owned(&mut features, &poses);
@@ -152,10 +157,10 @@ fn search_pose(
     arcs: &[Arc],
     guess: &Pose,
     [span_m, span_deg]: [f64; 2],
-) -> Pose {
-    let mut best = *guess;
+) -> (Pose, f64) {
+    let (mut best, mut score) = (*guess, 0.0);
     if features.is_empty() || arcs.is_empty() {
-        return best;
+        return (best, score);
     }
     for ((places, headings), (of_m, of_deg, sigma_m)) in GRID.into_iter().zip(LEVELS) {
         let offset = |at: usize, count: usize, span: f64| {
@@ -177,9 +182,51 @@ fn search_pose(
             .map(|at| agreement(features, arcs, &pose(at), sigma_m))
             .collect();
         let found = (0..scores.len()).max_by(|a, b| scores[*a].total_cmp(&scores[*b]));
-        best = found.map_or(best, pose);
+        (best, score) = found.map_or((best, score), |at| (pose(at), scores[at]));
     }
-    best
+    (best, score)
+}
+
+/// Pose in any direction near a place at which arcs agree best with features, without odometry: a
+/// grid of positions and headings, whose best places are searched finely.
+fn search_everywhere(features: &[SupportedFeature], arcs: &[Arc], near: &Pose) -> Pose {
+    /// Half width of the region, metres.
+    const SPAN_M: f64 = 1.5;
+    const STEP_M: f64 = 0.1;
+    const STEP_DEG: f64 = 3.0;
+    /// Range error in the grid, metres: half the diagonal of a cell.
+    const SIGMA_M: f64 = 0.05;
+    const FINE: usize = 24;
+    let places = (2.0 * SPAN_M / STEP_M) as usize + 1;
+    let headings = (360.0 / STEP_DEG) as usize;
+    let pose = |at: usize| Pose {
+        x_m: near.x_m - SPAN_M + STEP_M * (at % places) as f64,
+        y_m: near.y_m - SPAN_M + STEP_M * (at / places % places) as f64,
+        heading_deg: wrap_180(STEP_DEG * (at / (places * places)) as f64),
+    };
+    let scores: Vec<f64> = (0..places * places * headings)
+        .into_par_iter()
+        .map(|at| agreement(features, arcs, &pose(at), SIGMA_M))
+        .collect();
+    let mut order: Vec<usize> = (0..scores.len()).collect();
+    order.sort_by(|a, b| scores[*b].total_cmp(&scores[*a]).then(a.cmp(b)));
+    let mut tried: Vec<Pose> = Vec::new();
+    let is_apart = |a: &Pose, b: &Pose| {
+        a.position().distance(b.position()) > 1.5 * STEP_M
+            || wrap_180(a.heading_deg - b.heading_deg).abs() > 2.5 * STEP_DEG
+    };
+    for at in order {
+        let pose = pose(at);
+        if tried.iter().all(|known| is_apart(known, &pose)) {
+            tried.push(pose);
+        }
+        if tried.len() >= FINE {
+            break;
+        }
+    }
+    let fine = |pose: &Pose| search_pose(features, arcs, pose, [0.8 * STEP_M, STEP_DEG]);
+    let found = tried.iter().map(fine).max_by(|a, b| a.1.total_cmp(&b.1));
+    found.map_or(*near, |(pose, _)| pose)
 }
 
 /// Sum over arcs of the agreement with the best feature, 0 to 1 each, weighted by their beams and

@@ -32,8 +32,8 @@ use crate::{
 /// Assumptions and limits of a survey.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurveyOptions {
-    /// Errors of the sweeps' poses as odometry.
-    pub odometry: OdometrySigma,
+    /// Errors of the sweeps' poses as odometry; `None` to ignore these poses.
+    pub odometry: Option<OdometrySigma>,
     /// Standard deviation of directions of walls from a common square axis, degrees; `None` for any
     /// directions.
     pub square_deg: Option<f64>,
@@ -46,7 +46,7 @@ pub struct SurveyOptions {
 impl Default for SurveyOptions {
     fn default() -> Self {
         Self {
-            odometry: OdometrySigma::default(),
+            odometry: Some(OdometrySigma::default()),
             square_deg: None,
             reflectance: 0.97,
             max_scenes: 30_000,
@@ -139,7 +139,8 @@ pub(crate) fn workspace<'a>(
     let readings: Vec<Readings> =
         sweeps.iter().map(|sweep| Readings::new(sweep, world, max_range_m)).collect();
     let poses: Vec<Pose> = sweeps.iter().map(|sweep| sweep.pose).collect();
-    let moves = Move::between(&poses, options.odometry);
+    let between = |sigma| Move::between(&poses, sigma);
+    let moves = options.odometry.map_or_else(Vec::new, between);
     let workspace = Workspace::new((world.clone(), simulator), sweeps, readings, moves, observer);
     let without = workspace.arcs.iter().zip(sweeps).find(|(arcs, _)| arcs.is_empty());
     match without {
@@ -150,6 +151,7 @@ pub(crate) fn workspace<'a>(
 
 fn check(options: &SurveyOptions) -> Result<(), SurveyError> {
     let SurveyOptions { odometry, square_deg, reflectance, .. } = *options;
+    let odometry = odometry.unwrap_or_default();
     let positive = "positive and finite";
     let checks = [
         ("reflectance", reflectance, reflectance > 0.0 && reflectance <= 1.0, "above 0, up to 1"),

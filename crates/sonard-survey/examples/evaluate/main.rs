@@ -8,7 +8,7 @@ mod measure;
 mod rooms;
 mod simulate;
 
-use std::{error::Error, sync::Arc, time::Instant};
+use std::{error::Error, sync::Arc};
 
 use sonard_inverse::World;
 use sonard_model::{
@@ -32,8 +32,10 @@ struct Settings {
     stops: usize,
     beams: usize,
     odometry: [f64; 2],
+    odometry_is_used: bool,
     noise: ReadingNoise,
     is_verbose: bool,
+    prints_walls: bool,
 }
 
 /// Figures of one room.
@@ -97,7 +99,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 const HEAD: &str = "| kind | rooms | complete | recall | precision | corner mm | position mm | heading deg | \
-held | true room | score within 5 | wrong observed m | seconds | scenes |";
+held | true room | score within 5 | wrong observed m | CPU s | scenes |";
 
 fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn Error>> {
     let mut random = generator(kind, seed);
@@ -121,12 +123,12 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
     }
     let [m_per_m, deg_per_m] = settings.odometry;
     let options = SurveyOptions {
-        odometry: OdometrySigma { m_per_m, deg_per_m },
+        odometry: settings.odometry_is_used.then_some(OdometrySigma { m_per_m, deg_per_m }),
         ..SurveyOptions::default()
     };
-    let start = Instant::now();
+    let start_s = cpu_s();
     let found = survey(&world, &readings, &options, &NoObserver)?;
-    let seconds = start.elapsed().as_secs_f64();
+    let seconds = cpu_s() - start_s;
     let truth: Vec<Ends> = world.scene.walls.iter().map(|wall| [wall.a, wall.b]).collect();
     let true_score = score_plan(&world, &readings, &options, &truth, &poses)?;
     let found_poses: Vec<Pose> = found.poses.iter().map(|of| of.pose).collect();
@@ -141,7 +143,10 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
                 * (1.0 - coverage(std::slice::from_ref(wall), &truth, 0.02, 2.0))
         })
         .sum();
-    let scene = found.scene("found", true).build()?;
+    if settings.prints_walls {
+        print_walls(&found, &motion, &truth);
+    }
+    let scene = found.scene("found", false).build()?;
     let in_frame = |sweep: &sonard_inverse::FitSweep| motion.inverse_of(&sweep.pose);
     let is_listed = found.alternatives.iter().any(|plan| {
         let walls = plan.walls.iter().map(|ends| ends.map(|end| motion.of(end.into())));
@@ -167,9 +172,18 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
     })
 }
 
-/// Walls in the true frame.
+/// CPU time of all threads so far, seconds (Linux).
+fn cpu_s() -> f64 {
+    const TICKS_PER_S: f64 = 100.0;
+    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let after_name = text.rsplit(')').next().unwrap_or_default();
+    let ticks = after_name.split_whitespace().skip(11).take(2).flat_map(str::parse::<f64>);
+    ticks.sum::<f64>() / TICKS_PER_S
+}
+
+/// Walls without conjectured stretches, in the true frame.
 fn walls(found: &Survey, motion: &RigidMotion) -> Vec<Ends> {
-    let stretches = found.walls.iter().flat_map(|wall| wall.stretches(true));
+    let stretches = found.walls.iter().flat_map(|wall| wall.stretches(false));
     stretches.map(|ends| ends.map(|end| motion.of(DVec2::from(end)))).collect()
 }
 
@@ -178,6 +192,21 @@ fn observed(found: &Survey, motion: &RigidMotion) -> Vec<Ends> {
     let pieces = found.walls.iter().flat_map(|wall| &wall.pieces);
     let observed = pieces.filter(|piece| piece.status == PieceStatus::Observed);
     observed.map(|piece| [piece.from_m, piece.to_m].map(|end| motion.of(end.into()))).collect()
+}
+
+/// Pieces of walls with their status, in the true frame, and the true walls.
+fn print_walls(found: &Survey, motion: &RigidMotion, truth: &[Ends]) {
+    let place = |at: DVec2| format!("({:.3}, {:.3})", at.x, at.y);
+    for [a, b] in truth {
+        println!("#   true {} {}", place(*a), place(*b));
+    }
+    for wall in &found.walls {
+        for piece in &wall.pieces {
+            let [a, b] = [piece.from_m, piece.to_m].map(|end| place(motion.of(end.into())));
+            let (id, status, evidence) = (&wall.id, piece.status, wall.evidence_nats);
+            println!("#   {id} {a} {b} {status:?} evidence {evidence:.1}");
+        }
+    }
 }
 
 fn print_trial(kind: RoomKind, trial: &Trial) {
@@ -234,14 +263,27 @@ impl Settings {
             stops: 8,
             beams: 400,
             odometry: [0.05, 5.0],
+            odometry_is_used: true,
             noise: ReadingNoise { sigma_db: 0.5, offset_db: 0.0, sigma_m: 0.001 },
             is_verbose: false,
+            prints_walls: false,
         };
         let mut args = std::env::args().skip(1);
         while let Some(name) = args.next() {
-            if name == "--verbose" {
-                settings.is_verbose = true;
-                continue;
+            match name.as_str() {
+                "--verbose" => {
+                    settings.is_verbose = true;
+                    continue;
+                }
+                "--walls" => {
+                    settings.prints_walls = true;
+                    continue;
+                }
+                "--no-odometry" => {
+                    settings.odometry_is_used = false;
+                    continue;
+                }
+                _ => {}
             }
             let value = args.next().ok_or_else(|| format!("{name}: a value is missing"))?;
             match name.as_str() {
