@@ -83,6 +83,7 @@ mod socket;
 #[cfg(feature = "daemon")]
 mod status;
 mod suggest;
+mod survey;
 mod sweeps;
 mod table;
 mod terminal;
@@ -152,6 +153,9 @@ enum Verb {
     /// Find the poses of scans without an initial guess
     #[command(long_about = locate::ABOUT)]
     Locate(Box<locate::Args>),
+    /// Reconstruct an unknown room and all poses from sweeps
+    #[command(long_about = survey::ABOUT)]
+    Survey(Box<survey::Args>),
     /// Classify planes, corners and edges in scans
     #[command(long_about = interpret::ABOUT)]
     Interpret(interpret::Args),
@@ -255,6 +259,7 @@ fn run_verb(verb: Verb) -> Outcome {
         Verb::Compare(args) => compare::run(&args),
         Verb::Calibrate(args) => calibrate::run(&args),
         Verb::Locate(args) => locate::run(&args),
+        Verb::Survey(args) => survey::run(&args),
         Verb::Interpret(args) => interpret::run(&args),
         Verb::Lines(args) => lines::run(&args),
         Verb::Map(args) => map::run(&args),

@@ -54,6 +54,8 @@ pub use sonard_model::{acoustics, array, geometry, model, motion, scene, viewpoi
 #[cfg(feature = "plot")]
 pub use sonard_plot as plot;
 pub use sonard_records as scan;
+#[cfg(feature = "inverse")]
+pub use sonard_survey as survey;
 
 #[cfg(feature = "cli")]
 pub mod cli;

@@ -2,7 +2,7 @@
 # Invariant 1: the crates of the pure part depend on nothing that does I/O or keeps time.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-pure=(sonard-model sonard-records sonard-export sonard-floorplan sonard-generate sonard-import sonard-interpret sonard-inverse sonard-plot)
+pure=(sonard-model sonard-records sonard-export sonard-floorplan sonard-generate sonard-import sonard-interpret sonard-inverse sonard-plot sonard-survey)
 # check CRATE BANNED...
 check() {
   local crate=$1 tree banned

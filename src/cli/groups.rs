@@ -11,7 +11,7 @@ pub(super) const GROUPS: [(&str, &[&str]); 9] = [
     ("Model", &["simulate", "paths", "trace", "predict", "generate"]),
     ("Logs and scans", &["plot", "compare", "interpret", "log", "import", "export"]),
     ("Estimate", &["calibrate", "locate"]),
-    ("Map", &["map", "lines"]),
+    ("Map", &["survey", "map", "lines"]),
     ("Device", &["doctor", "mock", "board"]),
     ("Scenes and presets", &["scene", "sensor", "array"]),
     ("Shell and reports", &["completions", "report"]),

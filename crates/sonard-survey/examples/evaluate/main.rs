@@ -1,0 +1,310 @@
+//! Surveys of random rooms, compared with the truth.
+//!
+//! ```sh
+//! cargo run --release -p sonard-survey --example evaluate -- --kinds rectangle,l --seeds 100:110
+//! ```
+
+mod measure;
+mod rooms;
+mod simulate;
+
+use std::{error::Error, sync::Arc};
+
+use sonard_inverse::World;
+use sonard_model::{
+    acoustics::{Air, Sensor},
+    geometry::{DVec2, Pose},
+    model::Options,
+    scene::Scene,
+};
+use sonard_survey::{
+    NoObserver, OdometrySigma, PieceStatus, SearchEnd, Survey, SurveyOptions, score_plan, survey,
+};
+
+use measure::{Ends, RigidMotion, corner_errors_m, coverage, explained, median};
+use rooms::{RoomKind, draw_course, draw_place, draw_room, drift, generator};
+use simulate::{ReadingNoise, sweeps};
+
+/// Settings of an evaluation.
+struct Settings {
+    kinds: Vec<RoomKind>,
+    seeds: std::ops::Range<u64>,
+    stops: usize,
+    beams: usize,
+    odometry: [f64; 2],
+    odometry_is_used: bool,
+    noise: ReadingNoise,
+    is_verbose: bool,
+    prints_walls: bool,
+}
+
+/// Figures of one room.
+struct Trial {
+    seed: u64,
+    recall: f64,
+    precision: f64,
+    corners_m: Vec<f64>,
+    position_m: f64,
+    heading_deg: f64,
+    held: f64,
+    true_held: f64,
+    /// Score less that of the true room at the true poses, nats.
+    lead_nats: f64,
+    /// Length of walls reported as observed that are none, metres.
+    wrong_observed_m: f64,
+    /// Whether an alternative is the true room.
+    is_listed: bool,
+    end: SearchEnd,
+    scenes: usize,
+    seconds: f64,
+}
+
+const MAX_RANGE_M: f64 = 4.0;
+/// Number of places that the survey does not visit.
+const HELD_PLACES: usize = 8;
+/// Shares of covered length from which a plan is complete.
+const COMPLETE: f64 = 0.995;
+/// Deficit of score from which a failure is one of the search, nats.
+const SEARCH_NATS: f64 = 5.0;
+
+impl Trial {
+    fn is_complete(&self) -> bool {
+        self.recall > COMPLETE && self.precision > COMPLETE
+    }
+
+    fn failure(&self) -> &'static str {
+        match (self.is_complete(), self.lead_nats < -SEARCH_NATS) {
+            (true, _) => "",
+            (false, true) => "search",
+            (false, false) => "information",
+        }
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let settings = Settings::from_args()?;
+    println!("{HEAD}");
+    for &kind in &settings.kinds {
+        let mut trials = Vec::new();
+        for seed in settings.seeds.clone() {
+            let trial = run(kind, seed, &settings)?;
+            if settings.is_verbose || !trial.is_complete() {
+                print_trial(kind, &trial);
+            }
+            trials.push(trial);
+        }
+        print_summary(kind, &trials);
+    }
+    Ok(())
+}
+
+const HEAD: &str = "| kind | rooms | complete | recall | precision | corner mm | position mm | heading deg | \
+held | true room | score within 5 | wrong observed m | CPU s | scenes |";
+
+fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn Error>> {
+    let mut random = generator(kind, seed);
+    let room = draw_room(kind, &mut random)?;
+    let sensor = Sensor::preset("senscomp-6500")?;
+    let options = Options { max_range_m: Some(MAX_RANGE_M), ..Options::default() };
+    let world = World::new(Arc::new(room), sensor, Air::default(), options);
+    let poses = draw_course(&world.scene, settings.stops, &mut random);
+    let odometry = drift(&poses, settings.odometry, &mut random);
+    let mut readings = sweeps(&world, &poses, settings.beams, settings.noise, &mut random)?;
+    let held: Vec<Pose> = (0..HELD_PLACES)
+        .map(|at| {
+            let place = draw_place(&world.scene, &mut random);
+            Pose { x_m: place.x, y_m: place.y, heading_deg: 45.0 * at as f64 }
+        })
+        .collect();
+    let held_noise = ReadingNoise { offset_db: settings.noise.offset_db, ..settings.noise };
+    let held_out = sweeps(&world, &held, settings.beams, held_noise, &mut random)?;
+    for (sweep, pose) in readings.iter_mut().zip(&odometry) {
+        sweep.pose = *pose;
+    }
+    let [m_per_m, deg_per_m] = settings.odometry;
+    let options = SurveyOptions {
+        odometry: settings.odometry_is_used.then_some(OdometrySigma { m_per_m, deg_per_m }),
+        ..SurveyOptions::default()
+    };
+    let start_s = cpu_s();
+    let found = survey(&world, &readings, &options, &NoObserver)?;
+    let seconds = cpu_s() - start_s;
+    let truth: Vec<Ends> = world.scene.walls.iter().map(|wall| [wall.a, wall.b]).collect();
+    let true_score = score_plan(&world, &readings, &options, &truth, &poses)?;
+    let found_poses: Vec<Pose> = found.poses.iter().map(|of| of.pose).collect();
+    let motion = RigidMotion::between(&found_poses, &poses);
+    let walls = walls(&found, &motion);
+    let [position_m, heading_deg] = motion.pose_errors(&found_poses, &poses);
+    let observed = observed(&found, &motion);
+    let wrong: f64 = observed
+        .iter()
+        .map(|wall| {
+            wall[0].distance(wall[1])
+                * (1.0 - coverage(std::slice::from_ref(wall), &truth, 0.02, 2.0))
+        })
+        .sum();
+    if settings.prints_walls {
+        print_walls(&found, &motion, &truth);
+    }
+    let scene = found.scene("found", false).build()?;
+    let in_frame = |sweep: &sonard_inverse::FitSweep| motion.inverse_of(&sweep.pose);
+    let is_listed = found.alternatives.iter().any(|plan| {
+        let walls = plan.walls.iter().map(|ends| ends.map(|end| motion.of(end.into())));
+        let walls: Vec<Ends> = walls.collect();
+        coverage(&truth, &walls, 0.02, 2.0) > COMPLETE
+            && coverage(&walls, &truth, 0.02, 2.0) > COMPLETE
+    });
+    Ok(Trial {
+        seed,
+        recall: coverage(&truth, &walls, 0.02, 2.0),
+        precision: coverage(&walls, &truth, 0.02, 2.0),
+        corners_m: corner_errors_m(&truth, &walls),
+        position_m,
+        heading_deg,
+        held: explained(&world, scene, &held_out, in_frame)?,
+        true_held: explained(&world, Scene::clone(&world.scene), &held_out, |sweep| sweep.pose)?,
+        lead_nats: found.score - true_score,
+        wrong_observed_m: wrong,
+        is_listed,
+        end: found.end,
+        scenes: found.scored_scenes,
+        seconds,
+    })
+}
+
+/// CPU time of all threads so far, seconds (Linux).
+fn cpu_s() -> f64 {
+    const TICKS_PER_S: f64 = 100.0;
+    let text = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let after_name = text.rsplit(')').next().unwrap_or_default();
+    let ticks = after_name.split_whitespace().skip(11).take(2).flat_map(str::parse::<f64>);
+    ticks.sum::<f64>() / TICKS_PER_S
+}
+
+/// Walls without conjectured stretches, in the true frame.
+fn walls(found: &Survey, motion: &RigidMotion) -> Vec<Ends> {
+    let stretches = found.walls.iter().flat_map(|wall| wall.stretches(false));
+    stretches.map(|ends| ends.map(|end| motion.of(DVec2::from(end)))).collect()
+}
+
+/// Observed pieces in the true frame.
+fn observed(found: &Survey, motion: &RigidMotion) -> Vec<Ends> {
+    let pieces = found.walls.iter().flat_map(|wall| &wall.pieces);
+    let observed = pieces.filter(|piece| piece.status == PieceStatus::Observed);
+    observed.map(|piece| [piece.from_m, piece.to_m].map(|end| motion.of(end.into()))).collect()
+}
+
+/// Pieces of walls with their status, in the true frame, and the true walls.
+fn print_walls(found: &Survey, motion: &RigidMotion, truth: &[Ends]) {
+    let place = |at: DVec2| format!("({:.3}, {:.3})", at.x, at.y);
+    for [a, b] in truth {
+        println!("#   true {} {}", place(*a), place(*b));
+    }
+    for wall in &found.walls {
+        for piece in &wall.pieces {
+            let [a, b] = [piece.from_m, piece.to_m].map(|end| place(motion.of(end.into())));
+            let (id, status, evidence) = (&wall.id, piece.status, wall.evidence_nats);
+            println!("#   {id} {a} {b} {status:?} evidence {evidence:.1}");
+        }
+    }
+}
+
+fn print_trial(kind: RoomKind, trial: &Trial) {
+    let corner_mm = 1e3 * median(trial.corners_m.clone());
+    println!(
+        "# {kind} {}: recall {:.3} precision {:.3} corner {corner_mm:.1} mm poses {:.2} mm {:.3} deg held {:.3} \
+         ({:.3}) score {:+.1} observed wrong {:.2} m listed {} {:?} {} scenes {:.1} s {}",
+        trial.seed,
+        trial.recall,
+        trial.precision,
+        1e3 * trial.position_m,
+        trial.heading_deg,
+        trial.held,
+        trial.true_held,
+        trial.lead_nats,
+        trial.wrong_observed_m,
+        trial.is_listed,
+        trial.end,
+        trial.scenes,
+        trial.seconds,
+        trial.failure(),
+    );
+}
+
+fn print_summary(kind: RoomKind, trials: &[Trial]) {
+    let count = trials.len().max(1) as f64;
+    let mean = |of: &dyn Fn(&Trial) -> f64| trials.iter().map(of).sum::<f64>() / count;
+    let middle = |of: &dyn Fn(&Trial) -> f64| median(trials.iter().map(of).collect());
+    let corners: Vec<f64> =
+        trials.iter().flat_map(|trial| trial.corners_m.iter().copied()).collect();
+    println!(
+        "| {kind} | {} | {} | {:.3} | {:.3} | {:.2} | {:.2} | {:.3} | {:.3} | {:.3} | {} | {:.2} | {:.1} | {:.0} |",
+        trials.len(),
+        trials.iter().filter(|trial| trial.is_complete()).count(),
+        mean(&|trial| trial.recall),
+        mean(&|trial| trial.precision),
+        1e3 * median(corners),
+        1e3 * middle(&|trial| trial.position_m),
+        middle(&|trial| trial.heading_deg),
+        mean(&|trial| trial.held),
+        mean(&|trial| trial.true_held),
+        trials.iter().filter(|trial| trial.lead_nats > -SEARCH_NATS).count(),
+        trials.iter().map(|trial| trial.wrong_observed_m).sum::<f64>(),
+        mean(&|trial| trial.seconds),
+        mean(&|trial| trial.scenes as f64),
+    );
+}
+
+impl Settings {
+    fn from_args() -> Result<Self, Box<dyn Error>> {
+        let mut settings = Self {
+            kinds: RoomKind::ALL.to_vec(),
+            seeds: 0..4,
+            stops: 8,
+            beams: 400,
+            odometry: [0.05, 5.0],
+            odometry_is_used: true,
+            noise: ReadingNoise { sigma_db: 0.5, offset_db: 0.0, sigma_m: 0.001 },
+            is_verbose: false,
+            prints_walls: false,
+        };
+        let mut args = std::env::args().skip(1);
+        while let Some(name) = args.next() {
+            match name.as_str() {
+                "--verbose" => {
+                    settings.is_verbose = true;
+                    continue;
+                }
+                "--walls" => {
+                    settings.prints_walls = true;
+                    continue;
+                }
+                "--no-odometry" => {
+                    settings.odometry_is_used = false;
+                    continue;
+                }
+                _ => {}
+            }
+            let value = args.next().ok_or_else(|| format!("{name}: a value is missing"))?;
+            match name.as_str() {
+                "--kinds" => {
+                    settings.kinds = value.split(',').map(str::parse).collect::<Result<_, _>>()?;
+                }
+                "--seeds" => {
+                    let (from, to) = value.split_once(':').ok_or("--seeds: use FROM:TO")?;
+                    settings.seeds = from.parse()?..to.parse()?;
+                }
+                "--stops" => settings.stops = value.parse()?,
+                "--beams" => settings.beams = value.parse()?,
+                "--odometry" => {
+                    let (m, deg) = value.split_once(',').ok_or("--odometry: use M,DEG")?;
+                    settings.odometry = [m.parse()?, deg.parse()?];
+                }
+                "--threshold-db" => settings.noise.offset_db = value.parse()?,
+                "--sigma-m" => settings.noise.sigma_m = value.parse()?,
+                _ => return Err(format!("{name} is no option").into()),
+            }
+        }
+        Ok(settings)
+    }
+}

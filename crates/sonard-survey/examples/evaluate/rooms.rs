@@ -1,0 +1,181 @@
+//! Random rooms by kind, and courses through them.
+
+use std::{fmt, str::FromStr};
+
+use rand::{Rng, RngExt, SeedableRng};
+use rand_distr::{Distribution, Normal};
+use rand_pcg::Pcg64;
+use sonard_model::{
+    geometry::{DVec2, Pose},
+    scene::{Scene, SceneError},
+};
+
+/// Kind of a random room.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum RoomKind {
+    /// Rectangle.
+    Rectangle,
+    /// Rectangle with one slanted wall.
+    Oblique,
+    /// Rectangle with a cut corner.
+    Cut,
+    /// L-shaped room.
+    L,
+    /// Rectangle with a box inside.
+    Box,
+}
+
+impl RoomKind {
+    pub(crate) const ALL: [Self; 5] =
+        [Self::Rectangle, Self::Oblique, Self::Cut, Self::L, Self::Box];
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Rectangle => "rectangle",
+            Self::Oblique => "oblique",
+            Self::Cut => "cut",
+            Self::L => "l",
+            Self::Box => "box",
+        }
+    }
+}
+
+impl fmt::Display for RoomKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for RoomKind {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let kinds = Self::ALL.map(Self::name).join(", ");
+        let found = Self::ALL.into_iter().find(|kind| kind.name() == text);
+        found.ok_or_else(|| format!("{text} is no kind of room: use {kinds}"))
+    }
+}
+
+/// Generator of a trial: independent of all others.
+pub(crate) fn generator(kind: RoomKind, seed: u64) -> Pcg64 {
+    Pcg64::seed_from_u64(1000 * seed + kind as u64)
+}
+
+/// Draws a room of 2.2 to 4.2 m, turned by any angle up to a right one.
+pub(crate) fn draw_room(kind: RoomKind, random: &mut impl Rng) -> Result<Scene, SceneError> {
+    let (mut w, mut d) = (random.random_range(2.4..4.0), random.random_range(2.2..3.4));
+    let mut inside = Vec::new();
+    let outline = match kind {
+        RoomKind::Rectangle => vec![[0.0, 0.0], [w, 0.0], [w, d], [0.0, d]],
+        RoomKind::Oblique => {
+            let slant = random.random_range(0.2..0.9);
+            vec![[0.0, 0.0], [w, 0.0], [w, d], [0.0, d - slant]]
+        }
+        RoomKind::Cut => {
+            let (a, b) = (random.random_range(0.6..1.1), random.random_range(0.6..1.1));
+            vec![[0.0, 0.0], [w, 0.0], [w, d - a], [w - b, d], [0.0, d]]
+        }
+        RoomKind::L => {
+            (w, d) = (random.random_range(3.0..4.2), random.random_range(2.6..3.8));
+            let (a, b) = (w * random.random_range(0.35..0.55), d * random.random_range(0.35..0.55));
+            vec![[0.0, 0.0], [w, 0.0], [w, d - b], [w - a, d - b], [w - a, d], [0.0, d]]
+        }
+        RoomKind::Box => {
+            (w, d) = (random.random_range(3.2..4.2), random.random_range(2.8..3.8));
+            let (a, b) = (random.random_range(0.3..0.7), random.random_range(0.3..0.7));
+            let x = random.random_range(0.7..w - 0.7 - a);
+            let y = random.random_range(0.7..d - 0.7 - b);
+            inside = vec![[x, y], [x + a, y], [x + a, y + b], [x, y + b]];
+            vec![[0.0, 0.0], [w, 0.0], [w, d], [0.0, d]]
+        }
+    };
+    let turn = DVec2::from_angle(random.random_range(0.0_f64..90.0).to_radians());
+    let turned = |corners: Vec<[f64; 2]>| -> Vec<[f64; 2]> {
+        corners.into_iter().map(|corner| turn.rotate(DVec2::from(corner)).to_array()).collect()
+    };
+    let room = Scene::builder(kind.name()).material("wall", 0.97);
+    let room = room.room("wall", &turned(outline), "wall");
+    if inside.is_empty() { room.build() } else { room.room("box", &turned(inside), "wall").build() }
+}
+
+/// Extent of the walls of a scene: lower left and upper right, metres.
+fn extent(scene: &Scene) -> [DVec2; 2] {
+    let ends = || scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
+    [ends().fold(DVec2::INFINITY, DVec2::min), ends().fold(DVec2::NEG_INFINITY, DVec2::max)]
+}
+
+/// Clearance of a ranger from all walls, metres.
+const CLEAR_M: f64 = 0.25;
+
+fn is_free(scene: &Scene, at: DVec2) -> bool {
+    scene.clearance_m(at) > CLEAR_M && scene.are_accessible(&[at]) == [true]
+}
+
+/// Draws a place with clearance.
+pub(crate) fn draw_place(scene: &Scene, random: &mut impl Rng) -> DVec2 {
+    let [low, high] = extent(scene);
+    loop {
+        let share = DVec2::new(random.random(), random.random());
+        let at = low + share * (high - low);
+        if is_free(scene, at) {
+            return at;
+        }
+    }
+}
+
+/// Draws a course of stops, 0.4 to 0.8 m from each to the next, straight and with clearance.
+pub(crate) fn draw_course(scene: &Scene, stops: usize, random: &mut impl Rng) -> Vec<Pose> {
+    const MAX_TRIES: usize = 5000;
+    let mut places = vec![draw_place(scene, random)];
+    let mut heading_deg: f64 = random.random_range(0.0..360.0);
+    let mut tries = 0;
+    while places.len() < stops && tries < MAX_TRIES {
+        tries += 1;
+        let turn = normal(random) * (50.0 + tries.min(130) as f64);
+        let next_deg = heading_deg + turn;
+        let from = places[places.len() - 1];
+        let step_m = random.random_range(0.4..0.8);
+        let to = from + step_m * DVec2::from_angle(next_deg.to_radians());
+        let is_clear = (0..9).all(|at| is_free(scene, from.lerp(to, f64::from(at) / 8.0)));
+        let is_old = places.iter().any(|place| place.distance(to) < 0.35);
+        if !is_clear || (is_old && random.random::<f64>() < 0.9) {
+            continue;
+        }
+        places.push(to);
+        (heading_deg, tries) = (next_deg, 0);
+    }
+    let heading = |at: usize| match places.get(at + 1) {
+        Some(next) => (next - places[at]).to_angle().to_degrees(),
+        None => heading_deg,
+    };
+    let pose = |at: usize| Pose { x_m: places[at].x, y_m: places[at].y, heading_deg: heading(at) };
+    (0..places.len()).map(pose).collect()
+}
+
+/// Odometry of a course whose moves have errors: standard deviations of the position per metre and
+/// of the heading in degrees per metre.
+pub(crate) fn drift(poses: &[Pose], per_m: [f64; 2], random: &mut impl Rng) -> Vec<Pose> {
+    let Some(first) = poses.first() else { return Vec::new() };
+    let mut odometry = vec![*first];
+    for pair in poses.windows(2) {
+        let frame = DVec2::from_angle(-pair[0].heading_deg.to_radians());
+        let moved = frame.rotate(pair[1].position() - pair[0].position());
+        let length_m = moved.length();
+        let error = DVec2::new(normal(random), normal(random)) * per_m[0] * length_m;
+        let turn_deg =
+            pair[1].heading_deg - pair[0].heading_deg + per_m[1] * length_m * normal(random);
+        let from = odometry[odometry.len() - 1];
+        let by = DVec2::from_angle(from.heading_deg.to_radians()).rotate(moved + error);
+        odometry.push(Pose {
+            x_m: from.x_m + by.x,
+            y_m: from.y_m + by.y,
+            heading_deg: from.heading_deg + turn_deg,
+        });
+    }
+    odometry
+}
+
+/// Standard normal deviate.
+pub(crate) fn normal(random: &mut impl Rng) -> f64 {
+    Normal::new(0.0, 1.0).map_or(0.0, |normal| normal.sample(random))
+}

@@ -1,0 +1,83 @@
+//! Sweeps with the noise of a real receiver.
+
+use rand::{Rng, RngExt};
+use rand_distr::{Distribution, StudentT};
+use sonard_inverse::{FiringOutcome, FitSweep, SweepFiring, World};
+use sonard_model::{geometry::Pose, model::Simulator, reading::PingStatus};
+use uuid::Uuid;
+
+use crate::rooms::normal;
+
+/// Noise of readings.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ReadingNoise {
+    /// Standard deviation of the threshold from firing to firing, decibels.
+    pub(crate) sigma_db: f64,
+    /// Threshold of the ranger relative to the assumed one, decibels.
+    pub(crate) offset_db: f64,
+    /// Standard deviation of ranges, metres; one in fifty has a far tail.
+    pub(crate) sigma_m: f64,
+}
+
+/// Thresholds at which sweeps are predicted, in standard deviations.
+const STEPS: [f64; 5] = [-1.8, -0.9, 0.0, 0.9, 1.8];
+
+/// Simulates sweeps of `beams` beams from each pose.
+pub(crate) fn sweeps(
+    world: &World,
+    poses: &[Pose],
+    beams: usize,
+    noise: ReadingNoise,
+    random: &mut impl Rng,
+) -> Result<Vec<FitSweep>, sonard_inverse::WorldError> {
+    let simulators: Result<Vec<Simulator>, _> = STEPS
+        .iter()
+        .map(|step| {
+            let mut world = world.clone();
+            world.sensor.threshold *= 10_f64.powf((noise.offset_db + step * noise.sigma_db) / 20.0);
+            world.simulator(&Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 })
+        })
+        .collect();
+    let simulators = simulators?;
+    let weights = STEPS.map(|step| (-0.5 * step * step).exp());
+    let mut found = Vec::with_capacity(poses.len());
+    for (pose, number) in poses.iter().zip(1u128..) {
+        let points: Vec<_> = simulators.iter().map(|of| of.at(pose.position())).collect();
+        let mut fired = Vec::with_capacity(beams);
+        for at in 0..beams {
+            let azimuth_deg = at as f64 * 360.0 / beams as f64;
+            let point = &points[pick(&weights, random)];
+            let reading = point.ping(pose.direction_rad(azimuth_deg))?;
+            let outcome = match (reading.status, reading.range_m) {
+                (PingStatus::Echo, Some(range_m)) => {
+                    let range_m = range_m + range_error_m(noise.sigma_m, random);
+                    FiringOutcome::Echo { tof_us: 2e6 * range_m / world.air.sound_speed_m_s() }
+                }
+                (PingStatus::MinRange, _) => FiringOutcome::BelowMinRange,
+                _ => FiringOutcome::NoEcho,
+            };
+            fired.push(SweepFiring { azimuth_deg, outcome });
+        }
+        found.push(FitSweep { scan: Uuid::from_u128(number), pose: *pose, beams: fired });
+    }
+    Ok(found)
+}
+
+fn pick(weights: &[f64], random: &mut impl Rng) -> usize {
+    let mut rest = random.random::<f64>() * weights.iter().sum::<f64>();
+    let taken = weights.iter().position(|weight| {
+        rest -= weight;
+        rest < 0.0
+    });
+    taken.unwrap_or(0)
+}
+
+fn range_error_m(sigma_m: f64, random: &mut impl Rng) -> f64 {
+    const FAR_SHARE: f64 = 0.02;
+    const FAR_M: f64 = 0.005;
+    if random.random::<f64>() < FAR_SHARE {
+        StudentT::new(2.0).map_or(0.0, |tail| FAR_M * tail.sample(random))
+    } else {
+        sigma_m * normal(random)
+    }
+}

@@ -1,0 +1,153 @@
+//! Status of each piece of a plan, and other plans that explain the readings nearly as well.
+
+use sonard_model::geometry::DVec2;
+
+use crate::{
+    arrangement::{LineArrangement, PieceSet, Run, Segment},
+    judge::Judge,
+    refine::PosedPlan,
+    result::{PieceStatus, WallPiece},
+    search::{PlanSearch, ScoredPlan},
+    trace::touched_pieces,
+};
+
+/// Maximum difference of the score of a listed alternative, nats.
+pub(crate) const LISTED_NATS: f64 = 10.0;
+/// Loss of score above which a piece is not conjectured, nats.
+const IMPLIED_NATS: f64 = 3.0;
+/// Evidence above which no plan without a wall is searched, nats.
+const CERTAIN_NATS: f64 = 60.0;
+/// Maximum distance of points of plans that are the same, metres.
+const SAME_M: f64 = 0.02;
+
+/// Wall with its evidence and pieces.
+#[derive(Debug, Clone)]
+pub(crate) struct JudgedWall {
+    pub(crate) run: Run,
+    pub(crate) segment: Segment,
+    /// Loss of score without the wall, others unchanged, nats.
+    pub(crate) evidence_nats: f64,
+    pub(crate) pieces: Vec<WallPiece>,
+}
+
+/// Plans without one of the walls each, with their difference in score.
+pub(crate) struct Assessment {
+    pub(crate) walls: Vec<JudgedWall>,
+    pub(crate) alternatives: Vec<(Vec<Segment>, f64)>,
+    /// Best plan, if one of the alternatives is better than the plan given.
+    pub(crate) better: Option<ScoredPlan>,
+}
+
+/// Judges each wall by the best plan without it, and each piece by the paths that it reflects.
+pub(crate) fn assess(posed: &PosedPlan, judge: &Judge) -> Assessment {
+    let plan = &posed.plan;
+    let best = ScoredPlan { walls: posed.walls.clone(), score: judge.score(plan, &posed.walls) };
+    let touched = touched_pieces(plan, &best.walls, judge);
+    let touched = touched.unwrap_or_else(|| PieceSet::new(plan.pieces()));
+    let mut assessment = Assessment { walls: Vec::new(), alternatives: Vec::new(), better: None };
+    for run in plan.runs(&best.walls) {
+        let off: Vec<(usize, bool)> =
+            (run.first..=run.last).map(|at| (plan.piece(run.line, at), false)).collect();
+        let without = best.walls.changed(&off);
+        let evidence_nats = best.score - judge.score(plan, &without);
+        let other = (evidence_nats < CERTAIN_NATS)
+            .then(|| best_without(plan, judge, without, &best.walls, &run));
+        let lead_nats = other.as_ref().map_or(evidence_nats, |other| best.score - other.score);
+        if let Some(other) = other {
+            assessment.add(plan, &best, other);
+        }
+        let is_needed = lead_nats.min(evidence_nats) > IMPLIED_NATS;
+        let pieces = pieces(plan, judge, &best, &run, &touched, is_needed);
+        let segment = plan.segment(&run);
+        assessment.walls.push(JudgedWall { run, segment, evidence_nats, pieces });
+    }
+    assessment.alternatives.sort_by(|a, b| b.1.total_cmp(&a.1));
+    assessment
+}
+
+impl Assessment {
+    fn add(&mut self, plan: &LineArrangement, best: &ScoredPlan, other: ScoredPlan) {
+        let difference = other.score - best.score;
+        let is_best = self.better.as_ref().is_none_or(|better| other.score > better.score);
+        if difference > 0.5 && is_best {
+            self.better = Some(other.clone());
+        }
+        let segments = plan.segments(&other.walls);
+        let own = plan.segments(&best.walls);
+        let is_known = {
+            let known = self.alternatives.iter().map(|(known, _)| known.as_slice());
+            known.chain([own.as_slice()]).any(|known| is_same(known, &segments))
+        };
+        if difference > -LISTED_NATS && !is_known {
+            self.alternatives.push((segments, difference));
+        }
+    }
+}
+
+/// Best plan without any of the pieces of a wall.
+fn best_without(
+    plan: &LineArrangement,
+    judge: &Judge,
+    without: PieceSet,
+    walls: &PieceSet,
+    run: &Run,
+) -> ScoredPlan {
+    let mut excluded = PieceSet::new(plan.pieces());
+    for at in run.first..=run.last {
+        let piece = plan.piece(run.line, at);
+        excluded.set(piece, walls.contains(piece));
+    }
+    let search = PlanSearch { plan, judge, excluded: Some(&excluded) };
+    let found = search.climb(without);
+    search.trim(found)
+}
+
+/// Pieces of a wall by status, neighbours of one status joined.
+fn pieces(
+    plan: &LineArrangement,
+    judge: &Judge,
+    best: &ScoredPlan,
+    run: &Run,
+    touched: &PieceSet,
+    is_needed: bool,
+) -> Vec<WallPiece> {
+    let status = |at: usize| {
+        let piece = plan.piece(run.line, at);
+        if touched.contains(piece) && is_needed {
+            return PieceStatus::Observed;
+        }
+        let without = judge.score(plan, &best.walls.changed(&[(piece, false)]));
+        if is_needed && best.score - without > IMPLIED_NATS {
+            PieceStatus::Implied
+        } else {
+            PieceStatus::Conjectured
+        }
+    };
+    let mut found: Vec<WallPiece> = Vec::new();
+    for at in run.first..=run.last {
+        let [from_m, to_m] = plan.ends_of(run.line, at).map(|end| end.to_array());
+        let status = status(at);
+        match found.last_mut().filter(|last| last.status == status) {
+            Some(last) => last.to_m = to_m,
+            None => found.push(WallPiece { from_m, to_m, status }),
+        }
+    }
+    found
+}
+
+/// Returns `true` if all points of each plan are near the other.
+fn is_same(a: &[Segment], b: &[Segment]) -> bool {
+    let covers = |a: &[Segment], b: &[Segment]| a.iter().all(|wall| is_covered(wall, b));
+    covers(a, b) && covers(b, a)
+}
+
+fn is_covered(wall: &Segment, others: &[Segment]) -> bool {
+    const STEP_M: f64 = 0.05;
+    let count = (wall.a.distance(wall.b) / STEP_M).ceil().max(1.0) as usize;
+    let is_near = |point: DVec2| {
+        others.iter().any(|other| {
+            sonard_model::geometry::distance_to_segment(point, other.a, other.b) < SAME_M
+        })
+    };
+    (0..=count).all(|at| is_near(wall.a.lerp(wall.b, at as f64 / count as f64)))
+}

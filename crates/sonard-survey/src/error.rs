@@ -1,0 +1,28 @@
+//! Errors of a survey.
+
+use sonard_inverse::WorldError;
+use thiserror::Error;
+
+/// Reason why no survey is possible.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum SurveyError {
+    /// Fewer sweeps than needed.
+    #[error("{0} sweeps: a survey needs at least 2, from different places")]
+    TooFewSweeps(usize),
+    /// No arc in a sweep, so that its pose is unknown.
+    #[error("scan {0} has no arc of equal ranges, by which it could be located")]
+    NoArcs(uuid::Uuid),
+    /// Invalid sensor, air or options.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// Invalid assumption.
+    #[error("{name} is {value}: it must be {expected}")]
+    Option {
+        /// Name of the option.
+        name: &'static str,
+        /// Value of the option.
+        value: f64,
+        /// Valid range, in words.
+        expected: &'static str,
+    },
+}

@@ -1,0 +1,189 @@
+//! Score of a plan: likelihood of all readings by the exact model, less the price of its walls.
+
+use std::{
+    collections::HashMap,
+    f64::consts::TAU,
+    sync::{Arc, Mutex, PoisonError},
+};
+
+use sonard_model::{
+    geometry::{DVec2, Pose, distance_to_segment},
+    model::{Prediction, Simulator},
+    reading::PingStatus,
+    scene::{Material, Scene, Wall},
+};
+
+use crate::{
+    arrangement::{JOINED_M, LineArrangement, PieceSet, Segment},
+    readings::{Outcome, Readings},
+    workspace::Workspace,
+};
+
+/// Probability of an outlier among readings.
+const OUTLIER: f64 = 0.05;
+/// Share and mean length, standard deviations, of the exponential tail of range errors.
+const TAIL: (f64, f64) = (0.3, 3.0);
+/// Price of a line, of a wall on it, and of an end that meets no other wall, nats.
+const LINE_NATS: f64 = 4.0;
+const WALL_NATS: f64 = 4.0;
+const FREE_END_NATS: f64 = 2.0;
+/// Price of the length of walls, nats per metre.
+const LENGTH_NATS_PER_M: f64 = 0.5;
+/// Score of a plan with more paths than the model follows.
+const UNSCORED: f64 = -1e9;
+
+/// Predicted readings of all sweeps.
+pub(crate) type Predictions = Vec<Vec<Prediction>>;
+
+/// Scores plans against readings from given poses.
+pub(crate) struct Judge<'a> {
+    pub(crate) workspace: &'a Workspace<'a>,
+    pub(crate) poses: Vec<Pose>,
+    /// Standard deviation of ranges, metres.
+    pub(crate) sigma_m: f64,
+    known: Mutex<HashMap<PieceSet, f64>>,
+}
+
+impl<'a> Judge<'a> {
+    /// Judge of the plans of one arrangement, from given poses and with a standard deviation of
+    /// ranges in metres.
+    pub(crate) fn new(workspace: &'a Workspace<'a>, poses: &[Pose], sigma_m: f64) -> Self {
+        Self { workspace, poses: poses.to_vec(), sigma_m, known: Mutex::default() }
+    }
+
+    /// Judge from other poses.
+    pub(crate) fn at_poses(&self, poses: &[Pose]) -> Self {
+        Self::new(self.workspace, poses, self.sigma_m)
+    }
+
+    /// Readings of all sweeps.
+    pub(crate) fn readings(&self) -> &'a [Readings] {
+        &self.workspace.readings
+    }
+
+    /// Scores the walls of an arrangement, nats.
+    pub(crate) fn score(&self, plan: &LineArrangement, walls: &PieceSet) -> f64 {
+        if let Some(known) = self.lock().get(walls) {
+            return *known;
+        }
+        let score = self.score_segments(&plan.segments(walls));
+        self.lock().insert(walls.clone(), score);
+        score
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, HashMap<PieceSet, f64>> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Scores walls, nats.
+    pub(crate) fn score_segments(&self, segments: &[Segment]) -> f64 {
+        self.log_likelihood(segments) - price(segments)
+    }
+
+    /// Log-likelihood of all readings, with the readings of an arc as one, nats.
+    pub(crate) fn log_likelihood(&self, segments: &[Segment]) -> f64 {
+        self.workspace.count();
+        let Some(simulator) = self.simulator_of(segments) else { return UNSCORED };
+        let of_sweep = |(readings, pose): (&Readings, &Pose)| {
+            let predicted = predict(&simulator, readings, pose)?;
+            Some(self.of_sweep(readings, &predicted))
+        };
+        let sum: Option<f64> = self.readings().iter().zip(&self.poses).map(of_sweep).sum();
+        sum.unwrap_or(UNSCORED)
+    }
+
+    fn of_sweep(&self, readings: &Readings, predicted: &[Prediction]) -> f64 {
+        let max_range_m = self.workspace.simulator.receiver().max_range_m;
+        let of_beam = |(measured, predicted): (Outcome, Outcome)| match (measured, predicted) {
+            (Outcome::Echo(range_m), Outcome::Echo(expected_m)) => {
+                let density = range_density(range_m - expected_m, self.sigma_m);
+                ((1.0 - OUTLIER) * density + OUTLIER / max_range_m).ln()
+            }
+            (Outcome::Echo(_), _) => (OUTLIER / max_range_m).ln(),
+            (Outcome::NoEcho, Outcome::NoEcho)
+            | (Outcome::BelowMinRange, Outcome::BelowMinRange) => (1.0 - OUTLIER).ln(),
+            _ => OUTLIER.ln(),
+        };
+        let pairs = readings.beams.iter().zip(predicted);
+        let sum: f64 = pairs.map(|(beam, of)| of_beam((beam.outcome, outcome_of(of)))).sum();
+        sum / readings.beams_per_arc()
+    }
+
+    /// Scene with these walls, in their order.
+    pub(crate) fn scene_of(&self, segments: &[Segment]) -> Scene {
+        scene_of(self.workspace.simulator.scene(), segments)
+    }
+
+    /// Simulator of a scene with these walls.
+    pub(crate) fn simulator_of(&self, segments: &[Segment]) -> Option<Simulator> {
+        self.workspace.simulator.in_scene(Arc::new(self.scene_of(segments))).ok()
+    }
+
+    /// Predicted readings of all sweeps, and the simulator.
+    pub(crate) fn predictions(&self, segments: &[Segment]) -> Option<(Simulator, Predictions)> {
+        let simulator = self.simulator_of(segments)?;
+        let of_sweep = |(readings, pose)| predict(&simulator, readings, pose);
+        let all: Option<Predictions> =
+            self.readings().iter().zip(&self.poses).map(of_sweep).collect();
+        all.map(|all| (simulator, all))
+    }
+}
+
+/// Scene with walls of the first material of a template; walls keep their index.
+fn scene_of(template: &Scene, segments: &[Segment]) -> Scene {
+    let material = template.materials.values().next().copied().unwrap_or(Material::RIGID);
+    let wall = |(at, segment): (usize, &Segment)| Wall {
+        id: format!("wall-{at}").into(),
+        a: segment.a,
+        b: segment.b,
+        material,
+        z_m: None,
+    };
+    let mut scene = template.clone();
+    scene.walls = segments.iter().enumerate().map(wall).collect();
+    scene
+}
+
+fn predict(simulator: &Simulator, readings: &Readings, pose: &Pose) -> Option<Vec<Prediction>> {
+    let point = simulator.at(pose.position());
+    let beams = readings.beams.iter();
+    beams.map(|beam| point.ping(pose.direction_rad(beam.azimuth_deg)).ok()).collect()
+}
+
+/// Predicted outcome of a beam.
+pub(crate) fn outcome_of(prediction: &Prediction) -> Outcome {
+    match (prediction.status, prediction.range_m) {
+        (PingStatus::Echo, Some(range_m)) => Outcome::Echo(range_m),
+        (PingStatus::MinRange, _) => Outcome::BelowMinRange,
+        _ => Outcome::NoEcho,
+    }
+}
+
+/// Density of a range error, per metre: normal with a two-sided exponential tail.
+fn range_density(error_m: f64, sigma_m: f64) -> f64 {
+    let (share, length) = TAIL;
+    let off = error_m / sigma_m;
+    let normal = (-0.5 * off * off).exp() / (sigma_m * TAU.sqrt());
+    let tail = (-off.abs() / length).exp() / (2.0 * length * sigma_m);
+    (1.0 - share) * normal + share * tail
+}
+
+/// Price of walls, nats: the prior by description length.
+pub(crate) fn price(segments: &[Segment]) -> f64 {
+    let mut lines: Vec<usize> = segments.iter().map(|segment| segment.line).collect();
+    lines.sort_unstable();
+    lines.dedup();
+    let length_m: f64 = segments.iter().map(|segment| segment.a.distance(segment.b)).sum();
+    let is_free = |at: usize, end: DVec2| {
+        let mut others = segments.iter().enumerate().filter(|(other, _)| *other != at);
+        !others.any(|(_, other)| distance_to_segment(end, other.a, other.b) < JOINED_M)
+    };
+    let ends = segments.iter().enumerate();
+    let free: usize = ends
+        .map(|(at, segment)| [segment.a, segment.b].iter().filter(|end| is_free(at, **end)).count())
+        .sum();
+    LINE_NATS * lines.len() as f64
+        + WALL_NATS * segments.len() as f64
+        + FREE_END_NATS * free as f64
+        + LENGTH_NATS_PER_M * length_m
+}

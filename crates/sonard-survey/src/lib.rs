@@ -1,0 +1,52 @@
+//! Surveys: the floor plan of an unknown room, and all poses, from sweeps of a ranger.
+//!
+//! [`survey`] turns sweeps taken at a few places into walls with their uncertainty:
+//!
+//! 1. Arcs of equal range are found in each sweep, and poses are estimated with the map of
+//!    [`VirtualFeature`]s: a mirror image of a wall is a line and a mirror image of a corner is a
+//!    point, so multiple reflections are landmarks without an interpretation of their paths.
+//! 2. Lines through these features are cut at each other. Which pieces are walls is decided by the
+//!    likelihood of all readings under the exact model of `sonard_model`, less a price for walls.
+//! 3. Poses and lines are refined together with the paths of all explained arcs, and lines are
+//!    added where arcs remain unexplained.
+//!
+//! [`map_course`] does the first step alone, for courses without a scene.
+
+mod alternatives;
+mod arc;
+mod arrangement;
+mod bundle;
+mod candidates;
+mod course;
+mod error;
+mod faces;
+mod feature;
+mod judge;
+mod line;
+mod moves;
+mod normal;
+mod odometry;
+mod polish;
+mod progress;
+mod readings;
+mod refine;
+mod report;
+mod result;
+mod search;
+mod slam;
+mod survey;
+#[cfg(test)]
+mod tests;
+mod trace;
+mod workspace;
+
+pub use course::{CourseMap, map_course};
+pub use error::SurveyError;
+pub use feature::VirtualFeature;
+pub use odometry::OdometrySigma;
+pub use progress::{NoObserver, SurveyObserver, SurveyProgress, SurveyStage};
+pub use result::{
+    AlternativePlan, PieceStatus, ReadingCause, SearchEnd, Survey, SurveyedEnd, SurveyedPose,
+    SurveyedWall, UnexplainedArc, WallPiece,
+};
+pub use survey::{SurveyOptions, score_plan, survey};

@@ -1,0 +1,46 @@
+//! Progress and cancellation of a survey.
+
+/// Stage of a survey.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SurveyStage {
+    /// Poses and virtual features from arcs.
+    Course,
+    /// Round of the search for walls, from 1.
+    Walls {
+        /// Number of the round, from 1.
+        round: usize,
+    },
+    /// Alternatives, status and covariance of the plan found.
+    Alternatives,
+}
+
+/// Progress of a survey.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurveyProgress {
+    /// Current stage.
+    pub stage: SurveyStage,
+    /// Number of scenes scored so far.
+    pub scored_scenes: usize,
+    /// Score of the best plan so far, nats.
+    pub score: Option<f64>,
+    /// Number of walls of that plan.
+    pub walls: usize,
+}
+
+/// Observer of a survey; see [`NoObserver`] for none.
+pub trait SurveyObserver: Sync {
+    /// Reports progress, from one thread.
+    fn progress(&self, _progress: SurveyProgress) {}
+
+    /// Returns `true` to end the survey early with the best plan so far; must remain `true` once
+    /// set.
+    fn is_cancelled(&self) -> bool {
+        false
+    }
+}
+
+/// Observer that does nothing and never cancels.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct NoObserver;
+
+impl SurveyObserver for NoObserver {}

@@ -1,0 +1,75 @@
+//! Readings of a sweep at the world's speed of sound, in order of azimuth.
+
+use sonard_inverse::{FiringOutcome, FitSweep, World};
+use sonard_model::geometry::{Pose, wrap_360};
+
+/// Outcome of a beam, as measured or predicted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Outcome {
+    /// Range of the first echo, metres.
+    Echo(f64),
+    /// No echo within the maximum range.
+    NoEcho,
+    /// Target below the minimum range.
+    BelowMinRange,
+}
+
+/// Beam of a sweep.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Beam {
+    /// Azimuth, degrees in [0, 360).
+    pub(crate) azimuth_deg: f64,
+    pub(crate) outcome: Outcome,
+}
+
+/// Beams of a sweep in order of azimuth.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Readings {
+    /// Pose by odometry.
+    pub(crate) odometry: Pose,
+    pub(crate) beams: Vec<Beam>,
+    /// Median angle between neighbouring beams, degrees.
+    pub(crate) step_deg: f64,
+}
+
+impl Readings {
+    /// Readings of a sweep; an echo beyond the maximum range of the model counts as none.
+    pub(crate) fn new(sweep: &FitSweep, world: &World, max_range_m: f64) -> Self {
+        let sound_speed_m_s = world.air.sound_speed_m_s();
+        let outcome = |outcome: FiringOutcome| match (outcome, outcome.range_m(sound_speed_m_s)) {
+            (_, Some(range_m)) if range_m - world.delay_m <= max_range_m => {
+                Outcome::Echo(range_m - world.delay_m)
+            }
+            (FiringOutcome::BelowMinRange, _) => Outcome::BelowMinRange,
+            _ => Outcome::NoEcho,
+        };
+        let mut beams: Vec<Beam> = sweep
+            .beams
+            .iter()
+            .map(|beam| Beam {
+                azimuth_deg: wrap_360(world.heading_zero_deg + world.gear * beam.azimuth_deg),
+                outcome: outcome(beam.outcome),
+            })
+            .collect();
+        beams.sort_by(|a, b| a.azimuth_deg.total_cmp(&b.azimuth_deg));
+        let mut gaps: Vec<f64> =
+            beams.windows(2).map(|pair| pair[1].azimuth_deg - pair[0].azimuth_deg).collect();
+        gaps.retain(|gap| *gap > 1e-9);
+        gaps.sort_by(f64::total_cmp);
+        let step_deg = gaps.get(gaps.len() / 2).copied().unwrap_or(360.0);
+        Self { odometry: sweep.pose, beams, step_deg }
+    }
+
+    /// Angle from a beam to the following one, degrees; the first follows the last.
+    pub(crate) fn gap_after_deg(&self, at: usize) -> f64 {
+        let next = &self.beams[(at + 1) % self.beams.len()];
+        let gap = wrap_360(next.azimuth_deg - self.beams[at].azimuth_deg);
+        if self.beams.len() == 1 { 360.0 } else { gap }
+    }
+
+    /// Number of neighbouring beams whose errors are correlated because they share an arc: as many
+    /// as fit into 7.2 degrees, at most 8.
+    pub(crate) fn beams_per_arc(&self) -> f64 {
+        (7.2 / self.step_deg).clamp(1.0, 8.0)
+    }
+}

@@ -1,0 +1,137 @@
+//! Result of a survey from its final plan.
+
+use sonard_inverse::FitSweep;
+use sonard_model::{model::Prediction, reading::PathKind};
+
+use crate::{
+    alternatives::{Assessment, JudgedWall},
+    arrangement::LineArrangement,
+    judge::{Judge, outcome_of},
+    readings::{Beam, Outcome},
+    refine::{PlanCovariance, PosedPlan},
+    result::{
+        AlternativePlan, ReadingCause, SearchEnd, Survey, SurveyedEnd, SurveyedPose, SurveyedWall,
+        UnexplainedArc,
+    },
+    survey::{EXPLAINED_M, FINAL_SIGMA_M, SurveyOptions},
+    trace::unexplained,
+    workspace::Workspace,
+};
+
+pub(crate) fn report(
+    sweeps: &[FitSweep],
+    posed: &PosedPlan,
+    assessment: Assessment,
+    covariance: &Option<PlanCovariance>,
+    workspace: &Workspace,
+    (end, options): (SearchEnd, &SurveyOptions),
+) -> Survey {
+    let judge = Judge::new(workspace, &posed.poses, FINAL_SIGMA_M);
+    let score = judge.score(&posed.plan, &posed.walls);
+    let predictions = judge.predictions(&posed.plan.segments(&posed.walls));
+    let predictions = predictions.map(|(_, predictions)| predictions).unwrap_or_default();
+    let left = match predictions.is_empty() {
+        true => workspace.arcs.iter().flatten().collect(),
+        false => unexplained(&workspace.arcs, &workspace.readings, &predictions, EXPLAINED_M),
+    };
+    let causes = workspace.readings.iter().zip(&predictions).map(|(readings, predictions)| {
+        readings.beams.iter().zip(predictions).map(|(beam, of)| cause(beam, of)).collect()
+    });
+    let covariance = covariance.as_ref();
+    let (alternatives, probability) = weighted(&assessment);
+    Survey {
+        walls: assessment
+            .walls
+            .iter()
+            .enumerate()
+            .map(|(at, wall)| surveyed(at, wall, &posed.plan, covariance))
+            .collect(),
+        poses: sweeps
+            .iter()
+            .enumerate()
+            .map(|(at, sweep)| {
+                let sigma = covariance.map(|covariance| covariance.pose_sigma(at));
+                SurveyedPose {
+                    scan: sweep.scan,
+                    pose: posed.poses[at],
+                    sigma_m: sigma.map(|[x, y, _]| [x, y]),
+                    sigma_heading_deg: sigma.map(|[.., heading]| heading),
+                }
+            })
+            .collect(),
+        score,
+        arcs: workspace.arcs.iter().map(Vec::len).sum(),
+        unexplained: left
+            .iter()
+            .map(|arc| UnexplainedArc {
+                sweep: arc.sweep,
+                azimuth_deg: arc.azimuth_deg,
+                range_m: arc.range_m,
+                beams: arc.beams.len(),
+            })
+            .collect(),
+        causes: causes.collect(),
+        alternatives,
+        probability,
+        end,
+        scored_scenes: workspace.scored(),
+        reflectance: options.reflectance,
+    }
+}
+
+/// Alternatives with probabilities by their scores, and the probability of the best plan.
+fn weighted(assessment: &Assessment) -> (Vec<AlternativePlan>, f64) {
+    let weights: Vec<f64> =
+        assessment.alternatives.iter().map(|(_, difference)| difference.exp()).collect();
+    let sum = 1.0 + weights.iter().sum::<f64>();
+    let plans = assessment.alternatives.iter().zip(weights);
+    let plans = plans.map(|((walls, score_difference), weight)| AlternativePlan {
+        walls: walls.iter().map(|wall| [wall.a.to_array(), wall.b.to_array()]).collect(),
+        score_difference: *score_difference,
+        probability: weight / sum,
+    });
+    (plans.collect(), 1.0 / sum)
+}
+
+fn surveyed(
+    at: usize,
+    wall: &JudgedWall,
+    plan: &LineArrangement,
+    covariance: Option<&PlanCovariance>,
+) -> SurveyedWall {
+    let run = &wall.run;
+    let end = |cut: usize, at_m: [f64; 2]| {
+        let by = plan.cuts[run.line][cut].by;
+        let corner = |by: usize| covariance?.corner([run.line, by], plan);
+        SurveyedEnd { at_m, covariance_m2: by.and_then(corner) }
+    };
+    let middle_m = plan.lines[run.line].along_m(0.5 * (wall.segment.a + wall.segment.b));
+    let sigma = covariance.and_then(|covariance| covariance.line_sigma(run.line, middle_m));
+    SurveyedWall {
+        id: format!("wall-{}", at + 1),
+        from: end(run.first, wall.segment.a.to_array()),
+        to: end(run.last + 1, wall.segment.b.to_array()),
+        sigma_direction_deg: sigma.map(|[direction_deg, _]| direction_deg),
+        sigma_across_m: sigma.map(|[_, across_m]| across_m),
+        evidence_nats: wall.evidence_nats,
+        pieces: wall.pieces.clone(),
+    }
+}
+
+fn cause(beam: &Beam, prediction: &Prediction) -> ReadingCause {
+    let path = prediction.arrival.as_ref().map(|arrival| &arrival.path);
+    match (beam.outcome, outcome_of(prediction), path) {
+        (Outcome::Echo(measured_m), Outcome::Echo(expected_m), Some(path))
+            if (measured_m - expected_m).abs() < EXPLAINED_M =>
+        {
+            match path.kind() {
+                PathKind::Diffracted => ReadingCause::Edge,
+                _ if path.order() > 1 => ReadingCause::Multiple,
+                _ => ReadingCause::First,
+            }
+        }
+        (Outcome::NoEcho, Outcome::NoEcho, _)
+        | (Outcome::BelowMinRange, Outcome::BelowMinRange, _) => ReadingCause::NoRange,
+        _ => ReadingCause::Unexplained,
+    }
+}

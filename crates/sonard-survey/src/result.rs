@@ -1,0 +1,204 @@
+//! Result of a survey.
+
+use serde::{Deserialize, Serialize};
+use sonard_model::{
+    geometry::Pose,
+    scene::{Scene, SceneBuilder},
+};
+use uuid::Uuid;
+
+/// Floor plan and poses that explain the readings of sweeps, with what they leave undetermined.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Survey {
+    /// Walls of the best plan, in the frame of the first sweep's pose.
+    pub walls: Vec<SurveyedWall>,
+    /// Poses of the sweeps, in their order.
+    pub poses: Vec<SurveyedPose>,
+    /// Score of the plan, nats: log-likelihood of the readings, those of an arc as one, less the
+    /// price of the walls.
+    pub score: f64,
+    /// Number of arcs in all sweeps.
+    pub arcs: usize,
+    /// Arcs that the plan does not explain.
+    pub unexplained: Vec<UnexplainedArc>,
+    /// Cause of each reading, by sweep in order of azimuth.
+    pub causes: Vec<Vec<ReadingCause>>,
+    /// Other plans within 10 nats, most probable first.
+    pub alternatives: Vec<AlternativePlan>,
+    /// Probability of the best plan among those listed, 0 to 1.
+    pub probability: f64,
+    /// Reason why the search ended.
+    pub end: SearchEnd,
+    /// Number of scenes scored.
+    pub scored_scenes: usize,
+    /// Amplitude reflection coefficient assumed for all walls, 0 to 1.
+    pub reflectance: f64,
+}
+
+/// Wall of a plan.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SurveyedWall {
+    /// Name in the scene.
+    pub id: String,
+    /// First end.
+    pub from: SurveyedEnd,
+    /// Second end.
+    pub to: SurveyedEnd,
+    /// Standard deviation of the direction, degrees.
+    pub sigma_direction_deg: Option<f64>,
+    /// Standard deviation of the position across the wall, at its middle, metres.
+    pub sigma_across_m: Option<f64>,
+    /// Loss of score without the wall, nats.
+    pub evidence_nats: f64,
+    /// Stretches by status, from the first end to the second.
+    pub pieces: Vec<WallPiece>,
+}
+
+/// End of a wall.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SurveyedEnd {
+    /// Position, metres.
+    pub at_m: [f64; 2],
+    /// Covariance of a corner, metres squared (xx, xy, yy); `None` for a free end.
+    pub covariance_m2: Option<[f64; 3]>,
+}
+
+/// Stretch of a wall with one status.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct WallPiece {
+    /// First end, metres.
+    pub from_m: [f64; 2],
+    /// Second end, metres.
+    pub to_m: [f64; 2],
+    /// Knowledge of the stretch.
+    pub status: PieceStatus,
+}
+
+/// Knowledge of a stretch of wall.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PieceStatus {
+    /// The path of an explained arc is reflected there, and plans without the wall score worse.
+    Observed,
+    /// No path is reflected there, but the plan without the stretch scores more than 3 nats worse.
+    Implied,
+    /// The readings hardly depend on it.
+    Conjectured,
+}
+
+/// Pose of a sweep.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SurveyedPose {
+    /// Scan of the sweep.
+    pub scan: Uuid,
+    /// Pose in the frame of the first sweep.
+    pub pose: Pose,
+    /// Standard deviations of x and y, metres; 0 for the first sweep.
+    pub sigma_m: Option<[f64; 2]>,
+    /// Standard deviation of the heading, degrees.
+    pub sigma_heading_deg: Option<f64>,
+}
+
+/// Arc that the plan does not explain.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct UnexplainedArc {
+    /// Index of the sweep.
+    pub sweep: usize,
+    /// Azimuth of the middle, degrees from the heading.
+    pub azimuth_deg: f64,
+    /// Range, metres.
+    pub range_m: f64,
+    /// Number of beams.
+    pub beams: usize,
+}
+
+/// Cause of a reading in the plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ReadingCause {
+    /// One mirror reflection.
+    First,
+    /// Two or more mirror reflections.
+    Multiple,
+    /// Diffraction at an edge.
+    Edge,
+    /// Predicted missing echo or target below the minimum range.
+    NoRange,
+    /// The prediction differs.
+    Unexplained,
+}
+
+/// Plan that explains the readings nearly as well.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AlternativePlan {
+    /// Walls as pairs of ends, metres.
+    pub walls: Vec<[[f64; 2]; 2]>,
+    /// Score relative to that of the best plan, nats.
+    pub score_difference: f64,
+    /// Probability among the plans listed, 0 to 1.
+    pub probability: f64,
+}
+
+/// Reason why a search ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SearchEnd {
+    /// All arcs are explained and no move gains.
+    Complete,
+    /// No move gains, but arcs remain unexplained: the room has parts that are no smooth walls, or
+    /// the search missed walls.
+    UnexplainedArcs,
+    /// The budget of scored scenes is spent.
+    Budget,
+    /// The observer cancelled.
+    Cancelled,
+}
+
+impl Survey {
+    /// Scene of the best plan with the poses as `stop-1`, `stop-2`, ..., without conjectured
+    /// stretches unless `is_closed`.
+    #[must_use]
+    pub fn scene(&self, name: &str, is_closed: bool) -> SceneBuilder {
+        let mut scene = Scene::builder(name).material(MATERIAL, self.reflectance);
+        for wall in &self.walls {
+            let kept = wall.stretches(is_closed);
+            let is_single = kept.len() == 1;
+            for (at, ends) in kept.into_iter().enumerate() {
+                let id = if is_single { wall.id.clone() } else { format!("{}-{at}", wall.id) };
+                scene = scene.walls(&id, &ends.map(|end| end.map(rounded)), MATERIAL);
+            }
+        }
+        for (of, number) in self.poses.iter().zip(1..) {
+            let Pose { x_m, y_m, heading_deg } = of.pose;
+            let [x_m, y_m, heading_deg] = [x_m, y_m, heading_deg].map(rounded);
+            scene = scene.pose(&format!("stop-{number}"), x_m, y_m, heading_deg);
+        }
+        scene
+    }
+}
+
+const MATERIAL: &str = "wall";
+
+/// Rounds to a hundredth of a millimetre.
+fn rounded(metres: f64) -> f64 {
+    (1e5 * metres).round() / 1e5 + 0.0
+}
+
+impl SurveyedWall {
+    /// Longest stretches of the wall, with or without conjectured pieces.
+    #[must_use]
+    pub fn stretches(&self, with_conjectured: bool) -> Vec<[[f64; 2]; 2]> {
+        let mut found: Vec<[[f64; 2]; 2]> = Vec::new();
+        let mut is_joined = false;
+        for piece in &self.pieces {
+            let is_kept = with_conjectured || piece.status != PieceStatus::Conjectured;
+            match found.last_mut().filter(|_| is_joined) {
+                Some(last) if is_kept => last[1] = piece.to_m,
+                None if is_kept => found.push([piece.from_m, piece.to_m]),
+                _ => {}
+            }
+            is_joined = is_kept;
+        }
+        found
+    }
+}

@@ -1,0 +1,341 @@
+//! Survey as a whole.
+
+use std::sync::Arc;
+
+use sonard_inverse::{FitSweep, World};
+use sonard_model::{
+    geometry::{DVec2, Pose},
+    scene::{Material, Scene},
+};
+
+use crate::{
+    alternatives::{Assessment, assess},
+    arrangement::{LineArrangement, Segment},
+    bundle::{SupportedFeature, fit_feature},
+    candidates::CandidateSources,
+    error::SurveyError,
+    judge::Judge,
+    line::{Line, off_square_rad, square_axis},
+    odometry::{Move, OdometrySigma},
+    polish::polish,
+    progress::{NoObserver, SurveyObserver, SurveyProgress, SurveyStage},
+    readings::Readings,
+    refine::{PlanCovariance, PosedPlan, RefineSettings, refine},
+    report::report,
+    result::{SearchEnd, Survey},
+    search::{PlanSearch, initial_walls},
+    slam::virtual_map,
+    trace::unexplained,
+    workspace::Workspace,
+};
+
+/// Assumptions and limits of a survey.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurveyOptions {
+    /// Errors of the sweeps' poses as odometry; `None` to ignore these poses.
+    pub odometry: Option<OdometrySigma>,
+    /// Standard deviation of directions of walls from a common square axis, degrees; `None` for any
+    /// directions.
+    pub square_deg: Option<f64>,
+    /// Amplitude reflection coefficient of all walls, 0 to 1.
+    pub reflectance: f64,
+    /// Maximum number of scored scenes.
+    pub max_scenes: usize,
+}
+
+impl Default for SurveyOptions {
+    fn default() -> Self {
+        Self {
+            odometry: Some(OdometrySigma::default()),
+            square_deg: None,
+            reflectance: 0.97,
+            max_scenes: 30_000,
+        }
+    }
+}
+
+/// Round of the search for walls.
+struct Round {
+    /// Standard deviation of ranges, metres.
+    sigma_m: f64,
+    /// Maximum error of ranges that a refinement uses, metres.
+    gate_m: f64,
+    max_lines: usize,
+}
+
+/// Rounds, from rough poses to fine ones; the last is repeated while it gains.
+const ROUNDS: [Round; 3] = [
+    Round { sigma_m: 0.012, gate_m: 0.03, max_lines: 26 },
+    Round { sigma_m: 0.006, gate_m: 0.012, max_lines: 30 },
+    Round { sigma_m: FINAL_SIGMA_M, gate_m: 0.012, max_lines: 30 },
+];
+/// Standard deviation of ranges in the final score, metres.
+pub(crate) const FINAL_SIGMA_M: f64 = 0.004;
+/// Maximum number of rounds.
+const MAX_ROUNDS: usize = 6;
+/// Gain of a round below which the last one is not repeated, nats.
+const MIN_ROUND_GAIN: f64 = 0.5;
+/// Maximum error of a range that counts as explained, metres.
+pub(crate) const EXPLAINED_M: f64 = 0.012;
+const REFINE_STEPS: usize = 4;
+/// Share of the budget for the search; the rest is for alternatives.
+const SEARCH_SHARE: f64 = 0.7;
+
+/// Reconstructs the walls of a room and the poses of the sweeps.
+///
+/// The poses of the sweeps are odometry; the first is the frame. The scene of the world is ignored,
+/// and the sensor is assumed on the axis of the stepper. The result is independent of the number of
+/// threads.
+///
+/// # Errors
+/// Fewer than two sweeps, a sweep without arcs, or an invalid sensor or option.
+pub fn survey(
+    world: &World,
+    sweeps: &[FitSweep],
+    options: &SurveyOptions,
+    observer: &dyn SurveyObserver,
+) -> Result<Survey, SurveyError> {
+    let workspace = workspace(world, sweeps, options, observer)?;
+    workspace.limit_scenes((SEARCH_SHARE * options.max_scenes as f64) as usize);
+    let mut search = SurveySearch::new(&workspace, options);
+    search.run();
+    workspace.limit_scenes(options.max_scenes);
+    let end = search.end();
+    search.report_progress(SurveyStage::Alternatives);
+    let assessment = search.settle();
+    Ok(report(sweeps, &search.posed, assessment, &search.covariance, &workspace, (end, options)))
+}
+
+/// Score of given walls (pairs of ends, metres) and poses, nats, as that of a [`Survey`].
+///
+/// # Errors
+/// As [`survey`].
+pub fn score_plan(
+    world: &World,
+    sweeps: &[FitSweep],
+    options: &SurveyOptions,
+    walls: &[[DVec2; 2]],
+    poses: &[Pose],
+) -> Result<f64, SurveyError> {
+    let workspace = workspace(world, sweeps, options, &NoObserver)?;
+    let judge = Judge::new(&workspace, poses, FINAL_SIGMA_M);
+    let segment = |(line, &[a, b]): (usize, &[DVec2; 2])| Segment { line, a, b };
+    Ok(judge.score_segments(&walls.iter().enumerate().map(segment).collect::<Vec<_>>()))
+}
+
+pub(crate) fn workspace<'a>(
+    world: &World,
+    sweeps: &'a [FitSweep],
+    options: &SurveyOptions,
+    observer: &'a dyn SurveyObserver,
+) -> Result<Workspace<'a>, SurveyError> {
+    if sweeps.len() < 2 {
+        return Err(SurveyError::TooFewSweeps(sweeps.len()));
+    }
+    check(options)?;
+    let world = &empty_world(world, options.reflectance);
+    let simulator = world.simulator(&sweeps[0].pose)?;
+    let max_range_m = simulator.receiver().max_range_m;
+    let readings: Vec<Readings> =
+        sweeps.iter().map(|sweep| Readings::new(sweep, world, max_range_m)).collect();
+    let poses: Vec<Pose> = sweeps.iter().map(|sweep| sweep.pose).collect();
+    let between = |sigma| Move::between(&poses, sigma);
+    let moves = options.odometry.map_or_else(Vec::new, between);
+    let workspace = Workspace::new((world.clone(), simulator), sweeps, readings, moves, observer);
+    let without = workspace.arcs.iter().zip(sweeps).find(|(arcs, _)| arcs.is_empty());
+    match without {
+        Some((_, sweep)) => Err(SurveyError::NoArcs(sweep.scan)),
+        None => Ok(workspace),
+    }
+}
+
+fn check(options: &SurveyOptions) -> Result<(), SurveyError> {
+    let SurveyOptions { odometry, square_deg, reflectance, .. } = *options;
+    let odometry = odometry.unwrap_or_default();
+    let positive = "positive and finite";
+    let checks = [
+        ("reflectance", reflectance, reflectance > 0.0 && reflectance <= 1.0, "above 0, up to 1"),
+        ("m_per_m", odometry.m_per_m, odometry.m_per_m > 0.0, positive),
+        ("deg_per_m", odometry.deg_per_m, odometry.deg_per_m > 0.0, positive),
+        ("square_deg", square_deg.unwrap_or(1.0), square_deg.unwrap_or(1.0) > 0.0, positive),
+    ];
+    for (name, value, is_valid, expected) in checks {
+        if !is_valid || !value.is_finite() {
+            return Err(SurveyError::Option { name, value, expected });
+        }
+    }
+    Ok(())
+}
+
+/// World of an empty scene with the material of the walls, the transducer on the axis.
+fn empty_world(world: &World, reflectance: f64) -> World {
+    let mut world = world.clone();
+    let mut scene = Scene::clone(&world.scene);
+    scene.walls.clear();
+    scene.cylinders.clear();
+    scene.robot = None;
+    scene.materials = [("wall".to_owned(), Material { reflectance, roughness: 0.0 })].into();
+    world.scene = Arc::new(scene);
+    let mounting = &mut world.sensor.mounting;
+    (mounting.ahead_m, mounting.left_m, mounting.separation_m) = (0.0, 0.0, 0.0);
+    world
+}
+
+/// Search for poses and walls.
+struct SurveySearch<'a> {
+    workspace: &'a Workspace<'a>,
+    options: &'a SurveyOptions,
+    features: Vec<SupportedFeature<'a>>,
+    posed: PosedPlan,
+    covariance: Option<PlanCovariance>,
+    score: Option<f64>,
+}
+
+impl<'a> SurveySearch<'a> {
+    /// Begins with the poses of the virtual map.
+    fn new(workspace: &'a Workspace<'a>, options: &'a SurveyOptions) -> Self {
+        let start = workspace.readings[0].odometry;
+        let empty = LineArrangement::new(Vec::new(), &[start], 0.0);
+        let posed = PosedPlan { plan: empty, walls: Default::default(), poses: Vec::new() };
+        let mut search =
+            Self { workspace, options, features: Vec::new(), posed, covariance: None, score: None };
+        search.report_progress(SurveyStage::Course);
+        let map = virtual_map(&workspace.arcs, start, &workspace.moves);
+        (search.features, search.posed.poses) = (map.features, map.poses);
+        search
+    }
+
+    fn run(&mut self) {
+        for number in 0..MAX_ROUNDS {
+            let round = &ROUNDS[number.min(ROUNDS.len() - 1)];
+            self.report_progress(SurveyStage::Walls { round: number + 1 });
+            let before = self.score.filter(|_| number >= ROUNDS.len());
+            self.round(round, number == 0);
+            let is_settled = before
+                .is_some_and(|before| self.score.is_some_and(|now| now < before + MIN_ROUND_GAIN));
+            let is_done = number + 1 >= ROUNDS.len() && self.left().is_empty();
+            if is_settled || is_done || self.workspace.is_over() {
+                break;
+            }
+        }
+    }
+
+    /// Chooses lines, searches walls on them, and refines poses and lines.
+    fn round(&mut self, round: &Round, is_first: bool) {
+        for of in &mut self.features {
+            fit_feature(of, &self.posed.poses);
+        }
+        let plan = self.arrangement(round, is_first);
+        let walls = if is_first {
+            initial_walls(&plan, &self.posed.poses)
+        } else {
+            plan.transfer(&self.posed.plan, &self.posed.walls)
+        };
+        let judge = Judge::new(self.workspace, &self.posed.poses, round.sigma_m);
+        let search = PlanSearch { plan: &plan, judge: &judge, excluded: None };
+        let found = search.trim(search.climb(walls));
+        (self.posed.plan, self.posed.walls) = (plan, found.walls);
+        self.refine(&judge, round.gate_m);
+        self.score = Some(self.score_now(round.sigma_m));
+    }
+
+    fn refine(&mut self, judge: &Judge, gate_m: f64) {
+        let square_rad = self.options.square_deg.map(f64::to_radians);
+        let settings = RefineSettings { gate_m, square_rad };
+        self.covariance = refine(&mut self.posed, judge, &settings, REFINE_STEPS);
+    }
+
+    fn score_now(&self, sigma_m: f64) -> f64 {
+        let judge = Judge::new(self.workspace, &self.posed.poses, sigma_m);
+        judge.score(&self.posed.plan, &self.posed.walls)
+    }
+
+    /// Arrangement of the candidate lines of a round.
+    fn arrangement(&self, round: &Round, is_first: bool) -> LineArrangement {
+        let PosedPlan { plan, walls, poses } = &self.posed;
+        let segments = plan.segments(walls);
+        let left = self.left();
+        let is_used = |line: usize| segments.iter().any(|wall| wall.line == line);
+        let used = (0..plan.lines.len()).filter(|line| is_used(*line));
+        let sources = CandidateSources {
+            features: &self.features,
+            poses,
+            kept: used.map(|line| plan.lines[line].clone()).collect(),
+            walls: &segments,
+            left: (!is_first).then_some(&left),
+        };
+        let mut lines = sources.lines(round.max_lines);
+        if self.options.square_deg.is_some() {
+            square(&mut lines, poses);
+        }
+        LineArrangement::new(lines, poses, self.workspace.reach_m())
+    }
+
+    /// Arcs that the walls leave unexplained.
+    fn left(&self) -> Vec<&'a crate::arc::Arc> {
+        let judge = Judge::new(self.workspace, &self.posed.poses, 1.0);
+        let segments = self.posed.plan.segments(&self.posed.walls);
+        let workspace = self.workspace;
+        match judge.predictions(&segments) {
+            Some((_, predictions)) => {
+                unexplained(&workspace.arcs, &workspace.readings, &predictions, EXPLAINED_M)
+            }
+            None => workspace.arcs.iter().flatten().collect(),
+        }
+    }
+
+    fn end(&self) -> SearchEnd {
+        if self.workspace.observer.is_cancelled() {
+            SearchEnd::Cancelled
+        } else if self.workspace.is_spent() {
+            SearchEnd::Budget
+        } else if self.left().is_empty() {
+            SearchEnd::Complete
+        } else {
+            SearchEnd::UnexplainedArcs
+        }
+    }
+
+    /// Judges the walls; continues with an alternative that is better.
+    fn settle(&mut self) -> Assessment {
+        let last = &ROUNDS[ROUNDS.len() - 1];
+        for is_last in [false, false, true] {
+            let judge = Judge::new(self.workspace, &self.posed.poses, last.sigma_m);
+            let known = self.covariance.take();
+            self.covariance = polish(&mut self.posed, &judge, known.clone()).or(known);
+            let judge = Judge::new(self.workspace, &self.posed.poses, last.sigma_m);
+            let mut assessment = assess(&self.posed, &judge);
+            match assessment.better.take().filter(|_| !is_last) {
+                Some(better) => {
+                    self.posed.walls = better.walls;
+                    self.refine(&judge, last.gate_m);
+                }
+                None => return assessment,
+            }
+        }
+        unreachable!("the last assessment is returned")
+    }
+
+    fn report_progress(&self, stage: SurveyStage) {
+        self.workspace.observer.progress(SurveyProgress {
+            stage,
+            scored_scenes: self.workspace.scored(),
+            score: self.score,
+            walls: self.posed.plan.runs(&self.posed.walls).len(),
+        });
+    }
+}
+
+/// Turns lines to the nearest direction of a common square axis.
+fn square(lines: &mut [Line], poses: &[Pose]) {
+    const MAX_OFF_RAD: f64 = 0.12;
+    let supported: Vec<Line> = lines.iter().filter(|line| line.support >= 2).cloned().collect();
+    let Some(axis_rad) = square_axis(&supported) else { return };
+    let center = poses.iter().map(Pose::position).sum::<DVec2>() / poses.len().max(1) as f64;
+    for line in lines {
+        let off_rad = off_square_rad(line.normal_rad, axis_rad);
+        if off_rad.abs() < MAX_OFF_RAD {
+            *line = line.turned(-off_rad, center, poses);
+        }
+    }
+}

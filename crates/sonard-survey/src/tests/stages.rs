@@ -1,0 +1,153 @@
+//! Single stages.
+
+use sonard_model::geometry::{DVec2, distance_to_segment, wrap_180};
+
+use super::*;
+use crate::{
+    arc::find_arcs,
+    course::map_course,
+    faces::cells,
+    judge::Judge,
+    moves::MoveFinder,
+    progress::NoObserver,
+    search::{PlanSearch, initial_walls},
+};
+
+/// Every perpendicular and every square corner in reach has an arc at its exact range, a wall at its
+/// distance and a corner at its own.
+#[test]
+fn arcs_are_at_distances_of_walls_and_corners() {
+    let (corners, poses) = (rectangle(), stops());
+    let world = world(&corners);
+    let sweeps = sweeps(&world, &poses, &poses);
+    let workspace = true_workspace(&world, &sweeps, &NoObserver);
+    for (at, (readings, pose)) in workspace.readings.iter().zip(&poses).enumerate() {
+        let arcs = find_arcs(at, readings);
+        let walls = sides(&corners);
+        let of_walls = walls.iter().map(|[a, b]| {
+            let normal = (*b - *a).perp().normalize();
+            let off_m = (*a - pose.position()).dot(normal);
+            (off_m.abs(), (off_m * normal).to_angle())
+        });
+        for (range_m, direction_rad) in of_walls {
+            // Time walk delays echoes by a millimetre or two.
+            let is_found = arcs.iter().any(|arc| {
+                let off_rad = pose.direction_rad(arc.azimuth_deg) - direction_rad;
+                (-0.001..0.004).contains(&(arc.range_m - range_m))
+                    && off_rad.sin().abs() < 0.07
+                    && off_rad.cos() > 0.0
+            });
+            assert!(is_found, "sweep {at}: wall at {range_m} m among {arcs:?}");
+        }
+        let farthest_m = corners.iter().map(|corner| corner.distance(pose.position()));
+        let farthest_m = farthest_m.fold(0.0, f64::max);
+        assert!(
+            arcs.iter().any(|arc| (arc.range_m - farthest_m).abs() < 0.005),
+            "sweep {at}: corner at {farthest_m} m among {arcs:?}"
+        );
+    }
+}
+
+#[test]
+fn course_is_found_without_a_scene() {
+    let (corners, poses) = (rectangle(), stops());
+    let world = world(&corners);
+    let odometry = drifted(&poses);
+    let sweeps = sweeps(&world, &poses, &odometry);
+    let map = map_course(&world, &sweeps, &options()).expect("a course");
+    for (found, truth) in map.poses.iter().zip(&poses) {
+        let off_m = found.pose.position().distance(truth.position());
+        let off_deg = wrap_180(found.pose.heading_deg - truth.heading_deg).abs();
+        assert!(off_m < 0.003 && off_deg < 0.4, "{found:?} {truth:?}");
+        assert!(found.sigma_m.is_some_and(|[x, y]| x < 0.01 && y < 0.01), "{found:?}");
+    }
+    // All four walls and all four corners are among the features.
+    for [a, b] in sides(&corners) {
+        let normal = (b - a).perp().normalize();
+        let is_found = map.features.iter().any(|(feature, _)| match *feature {
+            crate::VirtualFeature::Line { normal_rad, distance_m, .. } => {
+                let own = DVec2::from_angle(normal_rad);
+                own.perp_dot(normal).abs() < 0.02 && (own.dot(a) - distance_m).abs() < 0.01
+            }
+            crate::VirtualFeature::Point { .. } => false,
+        });
+        assert!(is_found, "wall {a} {b}: {:?}", map.features);
+    }
+}
+
+#[test]
+fn lines_of_a_rectangle_have_one_cell() {
+    let corners = rectangle();
+    let (plan, walls) = plan_of(&sides(&corners), &stops());
+    let cells = cells(&plan);
+    assert_eq!(cells.len(), 1, "{cells:?}");
+    assert_eq!(cells[0].len(), 4);
+    assert!(cells[0].iter().all(|piece| walls.contains(*piece)));
+    let segments = plan.segments(&walls);
+    assert_eq!(segments.len(), 4);
+    for corner in corners {
+        let near = segments
+            .iter()
+            .filter(|wall| wall.a.distance(corner) < 1e-9 || wall.b.distance(corner) < 1e-9);
+        assert_eq!(near.count(), 2);
+    }
+}
+
+/// The true room scores higher than each room that one move away from it.
+#[test]
+fn truth_is_not_beaten_by_its_neighbours() {
+    let (corners, poses) = (rectangle(), stops());
+    let world = world(&corners);
+    let sweeps = sweeps(&world, &poses, &poses);
+    let workspace = true_workspace(&world, &sweeps, &NoObserver);
+    let judge = Judge::new(&workspace, &poses, 0.004);
+    // Two more lines across the room, without walls.
+    let mut lines = sides(&corners);
+    lines.push([corners[0].lerp(corners[1], 0.6), corners[3].lerp(corners[2], 0.6)]);
+    lines.push([corners[0].lerp(corners[3], 0.7), corners[1].lerp(corners[2], 0.7)]);
+    let (plan, mut walls) = plan_of(&lines, &poses);
+    for line in [4, 5] {
+        (0..plan.pieces_of(line)).for_each(|at| walls.set(plan.piece(line, at), false));
+    }
+    let truth = judge.score(&plan, &walls);
+    let moves = MoveFinder::new(&plan, &poses).moves(&walls);
+    assert!(moves.len() > 10, "{moves:?}");
+    for change in moves {
+        let score = judge.score(&plan, &walls.changed(&change));
+        assert!(score < truth, "{change:?}: {score} against {truth}");
+    }
+    // Wider by 3 cm on one side.
+    let mut wider = corners.clone();
+    let along = (corners[1] - corners[0]).normalize();
+    wider[1] += 0.03 * along;
+    wider[2] += 0.03 * along;
+    let (plan, walls) = plan_of(&sides(&wider), &poses);
+    assert!(judge.score(&plan, &walls) < truth - 50.0);
+}
+
+/// From the walls at perpendiculars alone the search closes the room.
+#[test]
+fn climbing_closes_the_room() {
+    let (corners, poses) = (rectangle(), stops());
+    let world = world(&corners);
+    let sweeps = sweeps(&world, &poses, &poses);
+    let workspace = true_workspace(&world, &sweeps, &NoObserver);
+    let judge = Judge::new(&workspace, &poses, 0.004);
+    let (mut plan, truth) = plan_of(&sides(&corners), &poses);
+    for line in &mut plan.lines {
+        for (sweep, pose) in poses.iter().enumerate() {
+            let along_m = line.along_m(pose.position());
+            let range_m = line.off_m(pose.position()).abs();
+            line.feet.push(crate::line::Foot { sweep, along_m, range_m });
+        }
+    }
+    let begun = initial_walls(&plan, &poses);
+    let search = PlanSearch { plan: &plan, judge: &judge, excluded: None };
+    let found = search.trim(search.climb(begun));
+    let segments = plan.segments(&found.walls);
+    for [a, b] in sides(&corners) {
+        let middle = a.midpoint(b);
+        assert!(segments.iter().any(|wall| distance_to_segment(middle, wall.a, wall.b) < 1e-6));
+    }
+    assert!((found.score - judge.score(&plan, &truth)).abs() < 1e-6, "{found:?}");
+}

@@ -1,0 +1,76 @@
+//! Inputs and limits that all stages of a survey share.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use sonard_inverse::{FitSweep, World};
+use sonard_model::model::Simulator;
+
+use crate::{
+    arc::{Arc, find_arcs},
+    odometry::Move,
+    progress::SurveyObserver,
+    readings::Readings,
+};
+
+/// Inputs of a survey with its budget.
+pub(crate) struct Workspace<'a> {
+    /// Empty world with the transducer on the axis.
+    pub(crate) world: World,
+    pub(crate) sweeps: &'a [FitSweep],
+    /// Simulator of that world, whose scene gives material and options, without walls.
+    pub(crate) simulator: Simulator,
+    pub(crate) readings: Vec<Readings>,
+    /// Arcs by sweep.
+    pub(crate) arcs: Vec<Vec<Arc>>,
+    /// Odometry between consecutive sweeps; empty without odometry.
+    pub(crate) moves: Vec<Move>,
+    pub(crate) observer: &'a dyn SurveyObserver,
+    scored: AtomicUsize,
+    limit: AtomicUsize,
+}
+
+impl<'a> Workspace<'a> {
+    pub(crate) fn new(
+        (world, simulator): (World, Simulator),
+        sweeps: &'a [FitSweep],
+        readings: Vec<Readings>,
+        moves: Vec<Move>,
+        observer: &'a dyn SurveyObserver,
+    ) -> Self {
+        let numbered = readings.iter().enumerate();
+        let arcs = numbered.map(|(sweep, readings)| find_arcs(sweep, readings)).collect();
+        let limit = AtomicUsize::new(usize::MAX);
+        Self { world, sweeps, simulator, readings, arcs, moves, observer, scored: 0.into(), limit }
+    }
+
+    /// Maximum range of the ranger, metres: the region around the poses with walls.
+    pub(crate) fn reach_m(&self) -> f64 {
+        self.simulator.receiver().max_range_m
+    }
+
+    /// Counts a scored scene.
+    pub(crate) fn count(&self) {
+        self.scored.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Number of scenes scored so far.
+    pub(crate) fn scored(&self) -> usize {
+        self.scored.load(Ordering::Relaxed)
+    }
+
+    /// Limits the number of scored scenes in all. The limit is checked between moves and rounds,
+    /// so the result is independent of the number of threads.
+    pub(crate) fn limit_scenes(&self, max: usize) {
+        self.limit.store(max, Ordering::Relaxed);
+    }
+
+    /// Returns `true` once the budget is spent or the observer cancelled.
+    pub(crate) fn is_over(&self) -> bool {
+        self.is_spent() || self.observer.is_cancelled()
+    }
+
+    /// Returns `true` once the budget is spent.
+    pub(crate) fn is_spent(&self) -> bool {
+        self.scored() >= self.limit.load(Ordering::Relaxed)
+    }
+}

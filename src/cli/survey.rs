@@ -1,0 +1,258 @@
+//! `sonard survey`.
+
+mod files;
+mod picture;
+mod summary;
+
+use std::{path::PathBuf, sync::Arc};
+
+use indicatif::ProgressBar;
+
+use super::{
+    Failure, Outcome,
+    answer::print_result,
+    logs::{for_each_scan, logs_in},
+    numbers::within,
+    output::{OutPath, Overwrite},
+    predictor::conditions,
+    progress,
+    runtime::{self, Interrupts},
+    what_if::{AssumptionFilter, InsteadArgs, WhatIf},
+};
+use crate::{
+    inverse::{FitSweep, World},
+    scan::{Provenance, Session, text::format_count},
+    scene::Scene,
+    survey::{
+        OdometrySigma, SearchEnd, Survey, SurveyError, SurveyObserver, SurveyOptions,
+        SurveyProgress, SurveyStage, survey,
+    },
+};
+
+/// Options of `sonard survey`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = HELP)]
+pub(super) struct Args {
+    /// Logs of sweeps in the order of the course, or folders of logs; - for standard input
+    #[arg(required = true, value_name = "LOG")]
+    logs: Vec<PathBuf>,
+    /// Output folder; scene, poses, walls with their status, report, picture
+    #[arg(long, value_name = "DIR")]
+    out: OutPath,
+    /// Standard deviations of the poses in the log as odometry: of the position per metre driven,
+    /// and of the heading, degrees per metre driven
+    #[arg(long, value_name = "M,DEG", default_value = "0.05,5", value_parser = parse_odometry)]
+    odometry: OdometrySigma,
+    /// Ignore the poses in the log
+    #[arg(long, conflicts_with = "odometry")]
+    no_odometry: bool,
+    /// Most walls are square to each other
+    #[arg(long)]
+    square: bool,
+    /// Keep conjectured stretches of walls in scene.json
+    #[arg(long)]
+    closed: bool,
+    /// Maximum range of readings used, metres; longer ranges count as no echo
+    #[arg(long, value_name = "M", default_value_t = 5.0, value_parser = within(0.3..=20.0))]
+    max_range: f64,
+    /// Amplitude reflection coefficient of the walls
+    #[arg(long, value_name = "R", default_value_t = 0.97, value_parser = within(0.05..=1.0))]
+    reflectance: f64,
+    /// Budget of the search: maximum number of floor plans whose readings are predicted
+    #[arg(long, value_name = "N", default_value_t = SurveyOptions::default().max_scenes,
+          value_parser = parse_count)]
+    max_scenes: usize,
+    /// JSON instead of text; one object, as in survey.json
+    #[arg(long)]
+    json: bool,
+    #[command(flatten)]
+    instead: InsteadArgs,
+    #[command(flatten)]
+    overwrite: Overwrite,
+}
+
+pub(super) const ABOUT: &str = "\
+Reconstruct an unknown room from sweeps taken at a few places.
+
+Poses come first: mirror images of walls are lines and mirror images of corners are points, so \
+echoes of any order locate the sweeps, with odometry as prior. Walls are then placed on lines \
+through these features such that the model explains the readings best: echoes along any path, \
+missing echoes, minimum ranges. No scene is needed; one in the log is ignored.
+
+Each stretch of wall is observed (the path of an explained echo is reflected there), implied \
+(plans without it explain less) or conjectured (left out of scene.json without --closed). Floor \
+plans that explain the readings nearly as well are listed with their probabilities. The frame is \
+the pose of the first sweep in the log. Dimensions follow the speed of sound: 0.17 % per degree.
+
+An interrupted survey writes the best plan so far.";
+
+const HELP: &str = "\
+Files in DIR: scene.json with the stops as poses; poses.csv; survey.json with covariances, status, \
+alternatives and the cause of each reading; report.md; plan.svg and plan.png.
+
+Examples:
+  sonard simulate --scene two-surface-room --pose 0.6,0.6,0 -o a.jsonl
+  sonard simulate --scene two-surface-room --pose 1.1,0.7,40 -o b.jsonl
+  sonard simulate --scene two-surface-room --pose 0.8,1.1,90 -o c.jsonl
+  sonard survey a.jsonl b.jsonl c.jsonl --odometry 0.05,5 --out room
+  sonard locate a.jsonl --scene room/scene.json
+
+Exit codes: 0 done, 1 ended early (interrupted, or the budget is spent), 2 wrong usage or input, \
+3 write error.";
+
+/// Sweeps of the logs and what they share.
+struct Input {
+    sweeps: Vec<FitSweep>,
+    world: World,
+    provenances: Vec<Provenance>,
+}
+
+pub(super) fn run(args: &Args) -> Outcome {
+    files::check(&args.out, args.overwrite)?;
+    let what_if = args.instead.load()?;
+    let input = read(args, &what_if)?;
+    let found = find(args, &input)?;
+    files::write(args, &input, &found)?;
+    print_result(args.json, [&found], |out| summary::print(out, &input, &found))?;
+    match found.end {
+        SearchEnd::Complete | SearchEnd::UnexplainedArcs => Ok(()),
+        SearchEnd::Budget | SearchEnd::Cancelled => Err(Failure::Found(None)),
+    }
+}
+
+impl Args {
+    fn options(&self) -> SurveyOptions {
+        /// Standard deviation of the directions of walls in a room that is mostly square.
+        const SQUARE_DEG: f64 = 1.0;
+        SurveyOptions {
+            odometry: (!self.no_odometry).then_some(self.odometry),
+            square_deg: self.square.then_some(SQUARE_DEG),
+            reflectance: self.reflectance,
+            max_scenes: self.max_scenes,
+        }
+    }
+}
+
+fn parse_odometry(text: &str) -> Result<OdometrySigma, String> {
+    let parts = text.split_once(',').and_then(|(m, deg)| {
+        Some([m.trim().parse::<f64>().ok()?, deg.trim().parse::<f64>().ok()?])
+    });
+    match parts {
+        Some([m_per_m, deg_per_m])
+            if (1e-4..=1.0).contains(&m_per_m) && (0.01..=180.0).contains(&deg_per_m) =>
+        {
+            Ok(OdometrySigma { m_per_m, deg_per_m })
+        }
+        _ => Err(
+            "give metres per metre (0.0001 to 1) and degrees per metre (0.01 to 180), such as 0.05,5"
+                .to_owned(),
+        ),
+    }
+}
+
+fn parse_count(text: &str) -> Result<usize, String> {
+    let count = text.parse().ok().filter(|count| (100..=10_000_000).contains(count));
+    count.ok_or_else(|| "give a number from 100 to 10000000".to_owned())
+}
+
+/// Reads the sweeps and the sensor and air that they share.
+fn read(args: &Args, what_if: &WhatIf) -> Result<Input, Failure> {
+    let mut assumptions = AssumptionFilter::new(what_if);
+    let mut input: Option<(Arc<Session>, Input)> = None;
+    for log in &logs_in(&args.logs)? {
+        for_each_scan(log, |mut scan| {
+            assumptions.apply(&mut scan);
+            let sweep = match FitSweep::from_scan(&scan) {
+                Ok(sweep) => sweep,
+                Err(error) => {
+                    notice!("warning: {}: {error}; scan skipped", log.display());
+                    return Ok(());
+                }
+            };
+            // Every sweep has a session.
+            let Some(session) = scan.session.clone() else { return Ok(()) };
+            match &mut input {
+                None => {
+                    let (air, mut options) = conditions(log, &session)?;
+                    let sensor_m = session.sensor.max_range_m;
+                    options.max_range_m = Some(args.max_range.min(sensor_m));
+                    let world = World::new(unknown_room()?, session.sensor.clone(), air, options);
+                    let provenances = vec![session.provenance];
+                    input = Some((session, Input { sweeps: vec![sweep], world, provenances }));
+                }
+                Some((first, input)) => {
+                    if first.sensor != session.sensor {
+                        return Err(Failure::input(
+                            format!(
+                                "{}: the sensor differs from that of the previous scans",
+                                log.display()
+                            ),
+                            "survey scans of one sensor together, or override it with --sensor",
+                        ));
+                    }
+                    input.sweeps.push(sweep);
+                    input.provenances.push(session.provenance);
+                }
+            }
+            Ok(())
+        })?;
+    }
+    let input = input.map(|(_, input)| input);
+    input.ok_or_else(|| {
+        Failure::input("there is no sweep to survey", "give logs of a ranger on a stepper")
+    })
+}
+
+/// Scene without walls.
+fn unknown_room() -> Result<Arc<Scene>, Failure> {
+    let empty = Scene::builder("unknown room").material("wall", 0.97).build();
+    empty.map(Arc::new).map_err(|error| Failure::input(error, "report this as a bug"))
+}
+
+/// Surveys until done or interrupted.
+fn find(args: &Args, input: &Input) -> Result<Survey, Failure> {
+    let runtime = runtime::new()?;
+    let interrupts = {
+        let _within = runtime.enter();
+        Interrupts::listen()
+    };
+    let sweeps = format_count(input.sweeps.len(), "sweep");
+    let bar = progress::spinner(&format!("survey of {sweeps}:"));
+    let observer = Observer { bar: bar.clone(), interrupts };
+    let found = survey(&input.world, &input.sweeps, &args.options(), &observer);
+    bar.finish_and_clear();
+    found.map_err(|error| failure_from(&error))
+}
+
+fn failure_from(error: &SurveyError) -> Failure {
+    let help = match error {
+        SurveyError::TooFewSweeps(_) => "give the sweeps of several places, in one log or several",
+        SurveyError::NoArcs(_) => "leave this scan out, or raise --max-range",
+        SurveyError::World(_) | SurveyError::Option { .. } => {
+            "check sensor and air of the logs, and the options"
+        }
+    };
+    Failure::input(error, help)
+}
+
+/// Progress and interrupts of a running survey.
+struct Observer {
+    bar: ProgressBar,
+    interrupts: Interrupts,
+}
+
+impl SurveyObserver for Observer {
+    fn progress(&self, progress: SurveyProgress) {
+        let stage = match progress.stage {
+            SurveyStage::Course => "poses".to_owned(),
+            SurveyStage::Walls { round } => format!("walls, round {round}"),
+            SurveyStage::Alternatives => "alternatives".to_owned(),
+        };
+        let (walls, plans) = (progress.walls, progress.scored_scenes);
+        self.bar.set_message(format!("{stage}, {walls} walls, {plans} floor plans tried"));
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.interrupts.happened()
+    }
+}

@@ -1,0 +1,63 @@
+//! Files of a survey.
+
+use std::path::Path;
+
+use super::{Args, Input, picture, summary};
+use crate::{
+    cli::{
+        Failure, Outcome,
+        output::{Overwrite, Product, make_folder},
+    },
+    survey::Survey,
+};
+
+const FILES: [&str; 4] = ["scene.json", "poses.csv", "survey.json", "report.md"];
+
+/// Checks, before any work, that the files may be written to the folder.
+///
+/// # Errors
+///
+/// A file that may not be replaced.
+pub(super) fn check(folder: &Path, overwrite: Overwrite) -> Outcome {
+    let texts = FILES.map(|name| (name, Product::Log));
+    let all = texts.into_iter().chain(picture::FILES);
+    all.into_iter().try_for_each(|(name, product)| overwrite.check_in(folder, name, product))
+}
+
+/// Writes all files to the output folder.
+///
+/// # Errors
+///
+/// Write errors, or a plan that is no valid scene.
+pub(super) fn write(args: &Args, input: &Input, found: &Survey) -> Outcome {
+    make_folder(&args.out)?;
+    let scene = found.scene("survey", args.closed);
+    scene.build().map_err(|error| {
+        Failure::input(error, "the survey found no walls: give sweeps with more echoes")
+    })?;
+    let json = serde_json::to_string_pretty(found).unwrap_or_default() + "\n";
+    let contents = [scene.text(), poses(found), json, summary::markdown(input, found)];
+    FILES.iter().zip(contents).try_for_each(|(name, text)| {
+        args.overwrite.save(&args.out.join(name), Product::Log, text.as_bytes())
+    })?;
+    picture::write(args, input, found)
+}
+
+/// Poses as CSV with their standard deviations.
+fn poses(found: &Survey) -> String {
+    let mut text = "scan,x_m,y_m,heading_deg,sigma_x_m,sigma_y_m,sigma_heading_deg\n".to_owned();
+    for of in &found.poses {
+        let pose = of.pose;
+        let sigma = |value: Option<f64>| value.map_or_else(String::new, |of| format!("{of:.6}"));
+        let [x, y] = [0, 1].map(|at: usize| sigma(of.sigma_m.map(|sigma| sigma[at])));
+        text += &format!(
+            "{},{:.6},{:.6},{:.5},{x},{y},{}\n",
+            of.scan,
+            pose.x_m,
+            pose.y_m,
+            pose.heading_deg,
+            sigma(of.sigma_heading_deg)
+        );
+    }
+    text
+}

@@ -1,0 +1,154 @@
+//! Summary of a survey as text and as Markdown.
+
+use std::{
+    fmt::Write as _,
+    io::{self, Write},
+};
+
+use super::Input;
+use crate::{
+    cli::table::{align_right, fit, ruled},
+    scan::text::format_count,
+    survey::{PieceStatus, ReadingCause, SearchEnd, Survey, SurveyedWall},
+};
+
+/// Walls, arcs and end of the search in a sentence.
+pub(super) fn in_short(input: &Input, found: &Survey) -> String {
+    let explained = found.arcs - found.unexplained.len();
+    format!(
+        "{} from {}; {explained} of {} explained",
+        format_count(found.walls.len(), "wall"),
+        format_count(input.sweeps.len(), "sweep"),
+        format_count(found.arcs, "arc"),
+    )
+}
+
+/// Findings beyond the tables, one sentence each.
+fn remarks(found: &Survey) -> Vec<String> {
+    let mut remarks =
+        vec![format!("{:.1} % of the readings are explained", 100.0 * explained_share(found))];
+    match found.end {
+        SearchEnd::Complete => {}
+        SearchEnd::UnexplainedArcs => remarks.push(format!(
+            "warning: {} unexplained: the room has parts other than smooth upright walls, or walls are missing",
+            format_count(found.unexplained.len(), "arc")
+        )),
+        SearchEnd::Budget => remarks.push(
+            "warning: the budget is spent before the search ended: raise --max-scenes".to_owned(),
+        ),
+        SearchEnd::Cancelled => {
+            remarks.push("warning: interrupted: this is the best plan so far".to_owned());
+        }
+    }
+    let conjectured_m = length_m(found, PieceStatus::Conjectured);
+    if conjectured_m > 0.005 {
+        remarks.push(format!(
+            "{conjectured_m:.2} m of walls are conjectured: readings hardly depend on them"
+        ));
+    }
+    if found.alternatives.is_empty() {
+        remarks.push("no other plan is within 10 nats of this one".to_owned());
+    }
+    for (other, number) in found.alternatives.iter().zip(1..) {
+        remarks.push(format!(
+            "alternative {number}: {}, probability {:.3} ({:+.1} nats)",
+            format_count(other.walls.len(), "wall"),
+            other.probability,
+            other.score_difference
+        ));
+    }
+    remarks
+}
+
+fn explained_share(found: &Survey) -> f64 {
+    let causes = || found.causes.iter().flatten();
+    let explained = causes().filter(|cause| **cause != ReadingCause::Unexplained).count();
+    explained as f64 / causes().count().max(1) as f64
+}
+
+/// Length of all stretches with a status, metres.
+fn length_m(found: &Survey, status: PieceStatus) -> f64 {
+    found.walls.iter().map(|wall| status_length_m(wall, status)).sum()
+}
+
+fn status_length_m(wall: &SurveyedWall, status: PieceStatus) -> f64 {
+    let pieces = wall.pieces.iter().filter(|piece| piece.status == status);
+    pieces
+        .map(|piece| {
+            let [from, to] = [piece.from_m, piece.to_m];
+            (to[0] - from[0]).hypot(to[1] - from[1])
+        })
+        .sum()
+}
+
+const WALL_HEAD: [&str; 7] =
+    ["wall", "from m", "to m", "across \u{b1} mm", "observed m", "implied m", "conjectured m"];
+const POSE_HEAD: [&str; 5] = ["stop", "x m", "y m", "heading deg", "\u{b1} mm, deg"];
+
+fn wall_row(wall: &SurveyedWall) -> [String; 7] {
+    let place = |[x, y]: [f64; 2]| format!("{x:.4}, {y:.4}");
+    let across = wall.sigma_across_m.map_or_else(|| "-".to_owned(), |m| format!("{:.2}", 1e3 * m));
+    let [observed, implied, conjectured] =
+        [PieceStatus::Observed, PieceStatus::Implied, PieceStatus::Conjectured]
+            .map(|status| format!("{:.2}", status_length_m(wall, status)));
+    let ends = [wall.from.at_m, wall.to.at_m].map(place);
+    let [from, to] = ends;
+    [wall.id.clone(), from, to, across, observed, implied, conjectured]
+}
+
+fn pose_rows(found: &Survey) -> impl Iterator<Item = [String; 5]> + '_ {
+    found.poses.iter().zip(1..).map(|(of, number)| {
+        let sigma = match (of.sigma_m, of.sigma_heading_deg) {
+            (Some([x, y]), Some(deg)) => format!("{:.2}, {deg:.3}", 1e3 * x.max(y)),
+            _ => "-".to_owned(),
+        };
+        [
+            number.to_string(),
+            format!("{:.4}", of.pose.x_m),
+            format!("{:.4}", of.pose.y_m),
+            format!("{:.3}", of.pose.heading_deg),
+            sigma,
+        ]
+    })
+}
+
+/// Prints walls and poses as tables, followed by remarks.
+pub(super) fn print(out: &mut impl Write, input: &Input, found: &Survey) -> io::Result<()> {
+    writeln!(out, "{}", in_short(input, found))?;
+    let mut walls = ruled(WALL_HEAD);
+    found.walls.iter().for_each(|wall| {
+        walls.add_row(wall_row(wall));
+    });
+    align_right(&mut walls, 3..usize::MAX);
+    writeln!(out, "{}", fit(walls))?;
+    let mut poses = ruled(POSE_HEAD);
+    pose_rows(found).for_each(|row| {
+        poses.add_row(row);
+    });
+    align_right(&mut poses, 0..usize::MAX);
+    writeln!(out, "{}", fit(poses))?;
+    remarks(found).iter().try_for_each(|remark| writeln!(out, "{remark}"))
+}
+
+/// Report with the tables of [`print`].
+pub(super) fn markdown(input: &Input, found: &Survey) -> String {
+    let mut text = format!("# Survey\n\n{}.\n\n", in_short(input, found));
+    for remark in remarks(found) {
+        // Writing to a string never fails.
+        let _ = writeln!(text, "- {remark}");
+    }
+    text += "\n![Floor plan](plan.png)\n\n";
+    text += &table(&WALL_HEAD, found.walls.iter().map(|wall| wall_row(wall).to_vec()));
+    text += "\n";
+    text += &table(&POSE_HEAD, pose_rows(found).map(|row| row.to_vec()));
+    text
+}
+
+fn table(head: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
+    let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+    let heads: Vec<String> = head.iter().map(|cell| (*cell).to_owned()).collect();
+    let rule: Vec<String> = head.iter().map(|_| "---".to_owned()).collect();
+    let mut text = line(&heads) + &line(&rule);
+    rows.for_each(|row| text += &line(&row));
+    text
+}
