@@ -193,8 +193,7 @@ fn dry_run_writes_no_log() {
     ]);
     let said = crate::common::stderr(&output);
     assert!(output.status.success() && output.stdout.is_empty(), "{said}");
-    for part in ["columns: ", "columns not used: `n`", "counter-clockwise", "1 scans, 36 readings"]
-    {
+    for part in ["columns: ", "columns not used: `n`", "counter-clockwise", "1 scan, 36 readings"] {
         assert!(said.contains(part), "{part}: {said}");
     }
     assert!(fs::read_to_string(path("a.svg")).expect("drawn").starts_with("<svg"));
