@@ -136,7 +136,7 @@ enum Verb {
     /// Generate random training data
     #[command(long_about = generate::ABOUT)]
     Generate(generate::Args),
-    /// Convert readings from other sources to a log: tables, JSON, logs of CARMEN and Player
+    /// Convert readings to a log: tables, JSON, recordings of ROS 2, logs of CARMEN and Player
     #[command(long_about = import::ABOUT)]
     Import(Box<import::Args>),
     /// Write logs for other tools: recordings of ROS 2, tables

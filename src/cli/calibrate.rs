@@ -111,7 +111,7 @@ prior_sigma, identified, at_limit. Logarithms and shares are reported in the fil
 Exit codes: 0 done, 1 interrupted, 2 wrong usage or input, 3 write error.";
 
 pub(super) fn run(args: &Args) -> Outcome {
-    let what_if = args.what_if.load()?;
+    let what_if = args.what_if.load(args.sweeps.scene()?.as_deref())?;
     if let Some(out) = &args.out
         && !checkpoint::check(out, args.overwrite)?
     {

@@ -68,7 +68,7 @@ scene is invalid.";
 pub(super) fn run(args: &Args) -> Outcome {
     let scene = args.scene.as_deref().map(scene_file::load).transpose()?.map(Arc::new);
     let mut all = Comparer::default();
-    let what_if = args.what_if.load()?;
+    let what_if = args.what_if.load(scene.as_deref())?;
     let several = logs_in(&args.logs)?;
     for log in &several {
         let predictor = Predictor::new(log, scene.as_ref(), &what_if);

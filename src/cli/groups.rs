@@ -18,7 +18,7 @@ pub(super) const GROUPS: [(&str, &[&str]); 9] = [
 ];
 
 /// Width of the column of names.
-const NAME_WIDTH: usize = 11;
+const NAME_WIDTH: usize = 13;
 
 /// Returns the command with a help template that lists its verbs in groups.
 pub(super) fn in_groups(command: Command) -> Command {
@@ -38,4 +38,16 @@ pub(super) fn in_groups(command: Command) -> Command {
     }
     let _ = write!(text, "{header}Options:{header:#}\n{{options}}{{after-help}}");
     command.help_template(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_separated_from_descriptions() {
+        let verbs = GROUPS.iter().flat_map(|(_, verbs)| *verbs);
+        let longest = verbs.map(|verb| verb.len()).max();
+        assert_eq!(longest, Some(NAME_WIDTH - 2));
+    }
 }

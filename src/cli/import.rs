@@ -29,7 +29,7 @@ use crate::{
     geometry::Pose,
     import::{Assumptions, ImportError, ImportSource, Imported, Mapping},
     plot::draw_scans,
-    scan::{ImportRef, Provenance, Record, ScanView, Session},
+    scan::{ImportRef, Provenance, Record, ScanView, Session, text::format_count},
     scene::{Scene, parse_pose},
     store::{RecordWriter, StoreError},
 };
@@ -250,8 +250,9 @@ fn report(args: &Args, found: &Imported, scans: u64) {
     }
     let no_range = found.readings - found.echoes;
     notice!(
-        "{scans} scans, {} readings: {} with a range, {no_range} without; sensor {}",
-        found.readings,
+        "{}, {}: {} with a range, {no_range} without; sensor {}",
+        format_count(scans, "scan"),
+        format_count(found.readings, "reading"),
         found.echoes,
         found.assumptions.sensor
     );

@@ -95,11 +95,11 @@ other parameters of `sonard calibrate`) these are fitted to each scan along with
 listed with it.
 
 A scan that no pose explains still gets its best pose, with the share of readings that it explains \
-and, if the readings show it, a likely cause: clockwise azimuths, or another unit.";
+and what the readings show of the cause: clockwise azimuths, another unit, sensor or place.";
 
 const HELP: &str = "\
 Examples:
-  sonard simulate --scene mcgill-lab --pose center -o scan.jsonl
+  sonard simulate --scene mcgill-lab --pose fig4 -o scan.jsonl
   sonard locate scan.jsonl
   sonard locate sweep.jsonl --scene my-room.json --sensor hc-sr04 --json
   sonard locate trajectory.jsonl --scene my-room.json --course --drift-m-per-m 0.1
@@ -176,11 +176,13 @@ fn print(
     let head = ["probability", "x m", "y m", "heading deg", "explained"].map(str::to_owned);
     let mut table = ruled(head.into_iter().chain(nuisance.iter().map(|of| of.name.clone())));
     for mode in modes {
+        // Adding zero removes the sign of -0.
+        let heading_deg = (100.0 * mode.heading_deg).round() / 100.0 + 0.0;
         let pose = [
             format!("{:.3}", mode.probability),
             format!("{:.3} \u{b1} {:.3}", mode.x_m, mode.sigma_x_m),
             format!("{:.3} \u{b1} {:.3}", mode.y_m, mode.sigma_y_m),
-            format!("{:.2} \u{b1} {:.2}", mode.heading_deg, mode.sigma_heading_deg),
+            format!("{heading_deg:.2} \u{b1} {:.2}", mode.sigma_heading_deg),
             format!("{:.0} %", 100.0 * mode.explained),
         ];
         let parameter = |of: &NuisanceEstimate| format!("{:.2} \u{b1} {:.2}", of.value, of.sigma);
@@ -188,5 +190,7 @@ fn print(
     }
     align_right(&mut table, 0..usize::MAX);
     writeln!(out, "{}", fit(table))?;
-    diagnoses.iter().try_for_each(|diagnosis| writeln!(out, "warning: {diagnosis}"))
+    diagnoses
+        .iter()
+        .try_for_each(|cause| writeln!(out, "warning: {cause}\n  help: {}", cause.advice()))
 }

@@ -56,7 +56,7 @@ Exit codes: 0 done, 2 wrong usage or input, 3 the disk gave up.";
 
 pub(super) fn run(args: &Args) -> Outcome {
     let given = args.scene.as_deref().map(scene_file::load).transpose()?.map(Arc::new);
-    let what_if = args.what_if.load()?.with_options(engine_options(&args.engine)?);
+    let what_if = args.what_if.load(given.as_deref())?.with_options(engine_options(&args.engine)?);
     let mut predictor = Predictor::new(&args.log, given.as_ref(), &what_if);
     let (pending, mut any) = (PendingRecords::default(), false);
     let to = (args.output.as_ref(), args.overwrite);

@@ -290,6 +290,8 @@ fn announce_user_places(keys: &Keys) -> Outcome {
             Failure::device(format!("cannot use {}: {error}", socket.display()), help)
         })?;
         tracing::info!("no rights to /run/sonard; the socket is {}", socket.display());
+    } else if socket == Path::new(socket::SYSTEM_SOCKET) {
+        socket::create_system_folder();
     }
     if socket::user_logs().is_some_and(|logs| logs == Path::new(&keys.log.folder)) {
         tracing::info!("no rights to /var/lib/sonard; the logs are in {}", keys.log.folder);

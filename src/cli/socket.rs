@@ -13,7 +13,7 @@ use rustix::{
 };
 
 /// Socket of the packaged daemon.
-const SYSTEM_SOCKET: &str = "/run/sonard/sonard.sock";
+pub(super) const SYSTEM_SOCKET: &str = "/run/sonard/sonard.sock";
 /// Name of a user's folder, and of the socket in it.
 const FOLDER: &str = "sonard";
 const SOCKET: &str = "sonard.sock";
@@ -71,6 +71,14 @@ pub(super) fn create_user_folder(socket: &Path) -> io::Result<()> {
         ));
     }
     Ok(())
+}
+
+/// Creates the folder of the system's socket, which systemd creates for the packaged unit only. An
+/// error is that of the socket, which cannot be opened then.
+pub(super) fn create_system_folder() {
+    if let Some(folder) = Path::new(SYSTEM_SOCKET).parent() {
+        let _ = fs::DirBuilder::new().mode(0o755).create(folder);
+    }
 }
 
 /// Returns `true` for a folder of this user that no other user may write to.

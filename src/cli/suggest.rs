@@ -82,6 +82,15 @@ const OPTIONS: [(&str, &[&str]); 31] = [
     ("world", &["scene"]),
 ];
 
+/// Options without which there is nothing to predict, and where to find their values.
+const PLACES: [(&str, &str); 2] = [
+    ("--scene", "'sonard scene list' lists the shipped scenes and their poses"),
+    (
+        "--pose",
+        "a pose is X,Y,DEG (metres, degrees), or a name from the scene: 'sonard scene list' lists them",
+    ),
+];
+
 /// Adds suggestions to an error of the command line.
 pub(super) fn suggest<'a>(
     mut error: Error,
@@ -119,6 +128,18 @@ pub(super) fn suggest<'a>(
                 error.insert(ContextKind::SuggestedArg, option);
                 // The tip to pass the argument as a value would distract.
                 error.remove(ContextKind::Suggested);
+            }
+        }
+        ErrorKind::MissingRequiredArgument => {
+            let missing = match error.get(ContextKind::InvalidArg) {
+                Some(ContextValue::Strings(names)) => names.join(" "),
+                _ => return error,
+            };
+            if let Some((_, tip)) = PLACES.iter().find(|(option, _)| missing.contains(option)) {
+                error.insert(
+                    ContextKind::Suggested,
+                    ContextValue::StyledStrs(vec![StyledStr::from(*tip)]),
+                );
             }
         }
         _ => {}
@@ -176,6 +197,9 @@ mod tests {
             (&["scan", "--temperature", "4"], "'--temperature-c'"),
             // Similar spelling.
             (&["simulat"], "'simulate'"),
+            // Missing options.
+            (&["simulate", "--scene", "a.json"], "X,Y,DEG"),
+            (&["scan", "--mock", "--out", "a"], "'sonard scene list'"),
         ] {
             let text = message(words);
             assert!(text.contains("tip: ") && text.contains(expected), "{text}");

@@ -8,15 +8,15 @@ use crate::{
     geometry::Pose,
     model::Options,
     scan::{Ping, ScanStart, ScanView, Session},
-    scene::parse_pose,
+    scene::{PoseError, Scene, parse_pose},
 };
 
 /// Options that override values of the log.
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "What if")]
 pub(super) struct WhatIfArgs {
-    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene; assumed
-    /// for all scans, X,Y,DEG only
+    /// Pose of the ranger, assumed for all scans: X,Y,DEG (metres, degrees), or the name of a pose
+    /// in the scene given by --scene
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
     /// Assumed heading, degrees counter-clockwise from the x axis
@@ -67,14 +67,19 @@ impl WhatIfArgs {
     ///
     /// # Errors
     ///
-    /// Unknown sensor, or invalid values.
-    pub(super) fn load(&self) -> Result<WhatIf, Failure> {
-        let pose = match &self.pose {
-            Some(pose) => {
-                Some(parse_pose(pose).map_err(|error| Failure::input(&error, error.help()))?)
-            }
-            None => None,
+    /// Unknown sensor or pose, or invalid values.
+    pub(super) fn load(&self, scene: Option<&Scene>) -> Result<WhatIf, Failure> {
+        let parse = |pose: &String| match scene {
+            Some(scene) => scene.pose(pose),
+            None => parse_pose(pose),
         };
+        let pose = self.pose.as_ref().map(parse).transpose();
+        let pose = pose.map_err(|error| {
+            let names = matches!(error, PoseError::Malformed(_)) && scene.is_none();
+            let without = "give X,Y,DEG (metres, degrees), or --scene for the names of its poses";
+            let help = if names { without.to_owned() } else { error.help() };
+            Failure::input(&error, help)
+        })?;
         Ok(WhatIf { pose, heading_deg: self.heading, ..self.instead.load()? })
     }
 }

@@ -31,6 +31,15 @@ pub(super) struct SweepArgs {
 }
 
 impl SweepArgs {
+    /// Loads the scene given instead of the logs' own.
+    ///
+    /// # Errors
+    ///
+    /// An unreadable or unknown scene.
+    pub(super) fn scene(&self) -> Result<Option<Arc<Scene>>, Failure> {
+        Ok(self.scene.as_deref().map(scene_file::load).transpose()?.map(Arc::new))
+    }
+
     /// Passes each sweep of the logs with its world and provenance to `take`; reports scans that
     /// are not sweeps.
     ///
@@ -42,8 +51,7 @@ impl SweepArgs {
         what_if: &WhatIf,
         mut take: impl FnMut(&Path, FitSweep, &Arc<World>, Provenance) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        let given = self.scene.as_deref().map(scene_file::load).transpose()?.map(Arc::new);
-        let mut worlds = WorldCache { given, current: None };
+        let mut worlds = WorldCache { given: self.scene()?, current: None };
         let mut assumptions = AssumptionFilter::new(what_if);
         for log in &self.logs {
             for_each_scan(log, |mut scan| {

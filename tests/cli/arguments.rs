@@ -49,3 +49,16 @@ fn too_many_cells() {
         assert!(text.contains("more than 10^12 cells are too many"), "{text}");
     }
 }
+
+/// Poses of the scene are listed if none is given and the default one is not free.
+#[test]
+fn missing_pose_of_a_daemon() {
+    let check = ["run", "--check", "--mock", "--scene", "simple-room"];
+    let [missing, wrong] =
+        [&[][..], &["--pose", "fig8"]].map(|pose| run(&[&check[..], pose].concat()));
+    assert_eq!(missing.status.code(), Some(2));
+    for part in ["the pose in `simple-room` is missing", "or `fig7`, `fig9`"] {
+        assert!(stderr(&missing).contains(part), "{}", stderr(&missing));
+    }
+    assert!(stderr(&wrong).contains("no pose `fig8`"), "{}", stderr(&wrong));
+}

@@ -99,6 +99,50 @@ fn symmetric_and_wrong_rooms() {
     assert!(elsewhere[0]["diagnoses"][0]["kind"].is_string(), "{}", elsewhere[0]);
 }
 
+/// Each cause of a poor fit is printed with what to do about it, on the next line.
+#[test]
+fn causes_of_a_poor_fit_have_advice() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = sweep(folder.path(), "simple-room", "fig9", &["--sensor", "hc-sr04"]);
+    let output = run(&["locate", &log, "--sensor", "senscomp-6500"]);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let text = String::from_utf8(output.stdout).expect("text");
+    for part in [
+        "warning: no pose in this scene explains more than",
+        "  help: check the scene (the right room",
+        "warning: the sensor measures 0.41 to 10.70 m",
+        "  help: select the sensor that took the readings",
+    ] {
+        assert!(text.contains(part), "{text}");
+    }
+    // With the right sensor there is nothing to advise.
+    let output = run(&["locate", &log]);
+    assert!(!String::from_utf8_lossy(&output.stdout).contains("warning"), "{output:?}");
+}
+
+/// Names of poses are accepted where the scene is given.
+#[test]
+fn assumed_pose_by_name() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = sweep(folder.path(), "simple-room", "fig9", &["--step-deg", "9"]);
+    let predict = ["predict", &log, "--scene", "simple-room", "--pose"];
+    let [named, given] = ["fig7", "0.834,0.345,0"].map(|pose| {
+        let output = run(&[&predict[..], &[pose]].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        String::from_utf8(output.stdout).expect("text").lines().skip(1).collect::<String>()
+    });
+    assert_eq!(named, given);
+    let calibrate = ["calibrate", &log, "--search", "quick", "--fit", "pose", "--json"];
+    let named = lines(&[&calibrate[..], &["--scene", "simple-room", "--pose", "fig9"]].concat());
+    assert!((number(&named[0], "value") - 0.774).abs() < 0.002, "{named:?}");
+    let unknown = run(&["compare", &log, "--scene", "simple-room", "--pose", "fig8"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(stderr(&unknown).contains("did you mean"), "{}", stderr(&unknown));
+    let nowhere = run(&["compare", &log, "--pose", "fig9"]);
+    assert_eq!(nowhere.status.code(), Some(2));
+    assert!(stderr(&nowhere).contains("--scene for the names"), "{}", stderr(&nowhere));
+}
+
 /// A ranger less sensitive than `locate` assumes, and one whose log states its sensitivity.
 #[test]
 fn threshold_with_pose() {

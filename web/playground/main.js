@@ -273,6 +273,7 @@ function showBeam(details) {
   trace.show(beam, peakOfReading(beam));
   pulse.show(beam);
   plan.select(ping ?? null, details.polyline);
+  updatePlanTexts();
 }
 
 /** @param {import("./engine.js").Beam} beam */

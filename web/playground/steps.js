@@ -78,8 +78,8 @@ export const STEPS = [
   {
     title: "What simpler models miss",
     text:
-      "The same pose in three models. A cone, as in most simulators, reports the nearest object within the beam: it never " +
-      "predicts false walls or missing echoes. A fan of rays includes reflections, but treats each echo separately. The " +
+      "The same pose in three models, below the plan. A cone, as in most simulators, reports the nearest object within the " +
+      "beam: it never predicts false walls or missing echoes. A fan of rays includes reflections, but treats each echo separately. The " +
       "exact paths, summed in the receiver, predict what the sensor reports. Now draw a room of your own with Edit room, or " +
       "open a log and drag the ranger to where it was measured.",
     scene: "simple-room",

@@ -35,7 +35,7 @@ const USUAL_SPACING_M: (f64, f64) = (0.05, 0.1);
 /// Minimum distance between matches, metres.
 const APART_M: f64 = 0.2;
 /// Margin outside the outermost wall of a scene without a closed room, metres.
-const MARGIN_M: f64 = 1.0;
+pub(crate) const MARGIN_M: f64 = 1.0;
 
 /// Predicted readings of a world on a grid of positions.
 #[derive(Clone)]
@@ -325,7 +325,7 @@ fn best_turns(
 }
 
 /// Bounding rectangle of a scene with a margin.
-fn extent(scene: &Scene) -> Option<(DVec2, DVec2)> {
+pub(crate) fn extent(scene: &Scene) -> Option<(DVec2, DVec2)> {
     let ends = scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
     let round = scene.cylinders.iter().map(|cylinder| cylinder.center);
     let named = scene.poses.values().map(Pose::position);

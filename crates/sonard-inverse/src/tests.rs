@@ -5,6 +5,7 @@ mod checkpoint;
 mod coarse;
 mod course;
 mod derivatives;
+mod diagnosis;
 mod margins;
 mod near;
 mod recovery;

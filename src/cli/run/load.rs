@@ -16,10 +16,10 @@ use super::{
 use crate::{
     array::RobotCourse,
     cli::{Failure, array::load_array, options::load_sensor, scene_file, socket},
-    config::{ConfigError, ConfigLayers, Keys, Mode, robot_name_from_host},
+    config::{ConfigError, ConfigLayers, Keys, Mode, PlaceKeys, robot_name_from_host},
     daemon::{ArraySimulation, OptionalOutputs, Settings, SettingsConflict},
     host_gpio,
-    scene::{PoseError, parse_pose},
+    scene::{PoseError, Scene, parse_pose},
 };
 
 /// Configuration file without `--config`.
@@ -169,7 +169,8 @@ fn settings(keys: Keys) -> Result<Settings, Failure> {
     let (scene, pose) = match &keys.place.scene {
         Some(name) => {
             let scene = scene_file::load(name)?;
-            let pose = scene_file::pose(&scene, &keys.place.pose)?;
+            let pose = scene_file::pose(&scene, &keys.place.pose)
+                .map_err(|failure| ask_for_pose(&scene, &keys.place.pose, failure))?;
             (Some(Arc::new(scene)), pose)
         }
         None => (None, parse_pose(&keys.place.pose).map_err(refuse_pose)?),
@@ -184,6 +185,19 @@ fn settings(keys: Keys) -> Result<Settings, Failure> {
         outputs: OUTPUTS,
         files: BTreeMap::new(),
     })
+}
+
+/// Explains that no pose was given where the default one is not free.
+fn ask_for_pose(scene: &Scene, pose: &str, failure: Failure) -> Failure {
+    if pose != PlaceKeys::default().pose {
+        return failure;
+    }
+    let names: Vec<String> = scene.poses.keys().map(|name| format!("`{name}`")).collect();
+    let names = if names.is_empty() { String::new() } else { format!(", or {}", names.join(", ")) };
+    Failure::input(
+        format!("the pose in `{}` is missing, and (0, 0) is not free", scene.name),
+        format!("give --pose (place.pose): X,Y,DEG (metres, degrees){names}"),
+    )
 }
 
 /// Settings of a simulated array; the sensor is the array's own unless one is configured.

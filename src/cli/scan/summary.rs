@@ -109,7 +109,7 @@ fn agreement(comparison: &Comparison, engine: &str) -> String {
 fn time(end: &ScanEnd) -> String {
     let ratio = end.duration_s / end.acoustic_limit_s;
     format!(
-        "  {:.1} s (physical minimum {:.1} s, ratio {ratio:.4})",
+        "  {:.1} s of device time (physical minimum {:.1} s, ratio {ratio:.4})",
         end.duration_s, end.acoustic_limit_s
     )
 }

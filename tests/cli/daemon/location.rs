@@ -105,7 +105,7 @@ fn locates_as_the_command_does() {
     way.iter().for_each(|location| assert_same(location, &listed));
     assert!(way[2].poses[0].probability > 0.99, "{:?}", way[2]);
     // If the robot may have been carried, the course does not constrain the pose.
-    let carried = course(&format!("?carried=1&to={}", scans[1]));
+    let carried = course(&format!("?kidnap_probability=1&to={}", scans[1]));
     assert_eq!(carried.len(), 2);
     assert_same(&carried[1], &located(&log, &["--course", "--kidnap-probability", "1"]));
     let absent = "00000000-0000-4000-8000-000000000000";
@@ -115,7 +115,7 @@ fn locates_as_the_command_does() {
         ("latest/course".to_owned(), 404),
         (format!("{}/course?to={absent}", scans[0]), 404),
         (format!("{}/course?to={}", scans[1], scans[0]), 404),
-        (format!("{}/course?carried=1.5", scans[0]), 422),
+        (format!("{}/course?kidnap_probability=1.5", scans[0]), 422),
         (format!("{}/course?drift_m_per_m=-1", scans[0]), 422),
         (format!("{}/course?drift=1", scans[0]), 400),
     ] {

@@ -193,8 +193,7 @@ fn dry_run_writes_no_log() {
     ]);
     let printed = crate::common::stderr(&output);
     assert!(output.status.success() && output.stdout.is_empty(), "{printed}");
-    for part in ["columns: ", "columns not used: `n`", "counter-clockwise", "1 scans, 36 readings"]
-    {
+    for part in ["columns: ", "columns not used: `n`", "counter-clockwise", "1 scan, 36 readings"] {
         assert!(printed.contains(part), "{part}: {printed}");
     }
     assert!(fs::read_to_string(path("a.svg")).expect("drawn").starts_with("<svg"));

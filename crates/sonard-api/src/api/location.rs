@@ -14,6 +14,9 @@ pub struct Location {
     pub poses: Vec<PoseMode>,
     /// Possible causes if no pose fits the readings.
     pub diagnoses: Vec<Misfit>,
+    /// Texts of these causes, each with what to check or to change.
+    #[serde(default)]
+    pub causes: Vec<String>,
     /// Reason why the scan could not be located.
     pub unavailable_reason: Option<String>,
 }

@@ -52,8 +52,8 @@ impl ListenError {
                 "another sonard daemon uses this socket: stop it, or set another server.socket"
             }
             (Some(SOCKET), io::ErrorKind::NotFound | io::ErrorKind::PermissionDenied) => {
-                "set server.socket to a path in a writable folder, or to an empty text for no \
-                 socket"
+                "give --socket (server.socket) a path in a writable folder, or set it to an empty text \
+                 for no socket"
             }
             (Some(SOCKET), io::ErrorKind::AlreadyExists) => {
                 "only the stale socket of an exited daemon is replaced: set server.socket to an unused \

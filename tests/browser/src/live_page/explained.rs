@@ -7,12 +7,12 @@ use sonard::{mock::Pace, scene::shipped};
 use super::{
     assert_clean,
     browser::{Browser, DESK},
-    count_pixels,
+    count_pixels, show_log,
 };
 use sonard_test_support::{
     daemon::{Daemon, write_token},
     rig::Rig,
-    run, wait_until,
+    run, stderr, wait_until,
 };
 
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
@@ -173,5 +173,47 @@ fn air_and_threshold_are_previewed() {
     browser.until("Number(document.getElementById('next-threshold').value) > 0.1");
     assert!((field("threshold") / threshold - 10.0).abs() < 0.01);
     assert_eq!(hypothesis_pixels(&browser), 0);
+    assert_clean(&browser);
+}
+
+/// A scan of another room is neither drawn nor proposed at the pose that explains a part of it.
+#[test]
+fn causes_of_an_unlocated_scan_are_listed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let log = folder.path().join("log");
+    fs::create_dir_all(&log).expect("there is room");
+    let [raw, log] = [folder.path().join("raw.jsonl"), log.join("sonard-20260102T000000Z.jsonl")];
+    let [raw, log] = [&raw, &log].map(|path| path.to_str().expect("plain"));
+    let steps = ["--step-deg", "3.6", "--max-range", "4", "-o", raw];
+    for command in [
+        [&["simulate", "--scene", "mcgill-lab", "--pose", "fig4"][..], &steps].concat(),
+        vec!["predict", raw, "--scene", "simple-room", "--pose", "fig9", "-o", log],
+    ] {
+        let output = run(&command);
+        assert!(output.status.success(), "{}", stderr(&output));
+    }
+    let options = ["--set", "server.listen=127.0.0.1:0", "--set", "scanning.mode=on-request"];
+    let daemon = Daemon::start_mock(folder.path(), &options);
+    daemon.wait_for("ready");
+    let browser = Browser::open(&daemon.address(), DESK);
+    show_log(&daemon, &browser, "20260102");
+    browser.click("#locate");
+    browser.until("document.querySelectorAll('#causes li').length > 1");
+    assert_eq!(browser.text("#located"), "No pose fits the readings. Possible causes:");
+    let causes = browser.text("#causes");
+    for part in [
+        "No pose in this scene explains",
+        "check the scene (the right room",
+        "it may be a larger place",
+    ] {
+        assert!(causes.contains(part), "{causes}");
+    }
+    assert!(!browser.text("#legend").contains("located pose"));
+    assert_eq!(browser.eval("document.getElementById('use-pose').hidden"), true);
+    // The causes belong to that scan.
+    assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
+    browser.until("document.querySelectorAll('#scans-list button').length === 2");
+    browser.click("#live");
+    browser.until("document.querySelectorAll('#causes li').length === 0");
     assert_clean(&browser);
 }

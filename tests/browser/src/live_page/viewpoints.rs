@@ -182,6 +182,88 @@ fn readings_of_a_moving_robot() {
     check_marks(&browser, &scan);
 }
 
+/// Residuals of an array have a column per ranger, in their order; a ranger without a prediction
+/// has no mark.
+#[test]
+fn residuals_are_shown_per_ranger() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write_displaced_array(folder.path());
+    let daemon = start_array(folder.path(), &FAN);
+    daemon.wait_for_scans(1);
+    let browser = Browser::open(&daemon.address(), DESK);
+    let scan = show_log(&daemon, &browser, "20260102");
+    let readings = scan["pings"].as_array().expect("readings");
+    assert_eq!(readings.len(), 8);
+    assert!(browser.text("#residuals .head p").contains("vs ranger"));
+    let heights = residual_heights(&browser, readings.len());
+    let mut shown: Vec<(f64, f64)> = Vec::new();
+    for (reading, height) in readings.iter().zip(&heights) {
+        let residual_m = reading["residual_m"].as_f64();
+        assert_eq!(residual_m.is_some(), height.is_some(), "{reading}: {heights:?}");
+        shown.extend(residual_m.zip(*height));
+    }
+    assert!(shown.len() > 5 && shown.len() < 8, "{} rangers have a residual", shown.len());
+    // A larger residual is drawn higher, unless both are clipped.
+    shown.sort_by(|a, b| a.0.total_cmp(&b.0));
+    assert!(shown.windows(2).all(|pair| pair[0].1 >= pair[1].1), "{shown:?}");
+    assert!(shown[0].1 - shown[shown.len() - 1].1 > 30.0, "{shown:?}");
+    // A click on a column selects its ranger's reading.
+    for (index, reading) in readings.iter().enumerate() {
+        browser.click_at("#strip", column(&browser, index, readings.len()), 0.5);
+        let ranger = reading["ranger"].as_str().expect("a name");
+        let label = browser.text("#beam-label");
+        assert!(label.starts_with(&format!("beam {index}, {ranger}")), "{label}");
+    }
+}
+
+/// Middle of a ranger's column of the residuals, as a fraction of the canvas; the margins are 46
+/// and 10 pixels.
+fn column(browser: &Browser, index: usize, rangers: usize) -> f64 {
+    let width = browser.eval("document.getElementById('strip').clientWidth");
+    let width = width.as_f64().expect("a number");
+    (46.0 + (index as f64 + 0.5) / rangers as f64 * (width - 56.0)) / width
+}
+
+/// Mean height of the dark or coloured pixels, as of marks, in each ranger's column of the
+/// residuals, pixels from the top; `None` without such pixels.
+fn residual_heights(browser: &Browser, rangers: usize) -> Vec<Option<f64>> {
+    browser.until_drawn();
+    let middles: Vec<f64> = (0..rangers).map(|index| column(browser, index, rangers)).collect();
+    let heights = browser.eval(&format!(
+        "(() => {{ const c = document.getElementById('strip'); \
+         const copy = new OffscreenCanvas(c.width, c.height); \
+         const c2d = copy.getContext('2d', {{willReadFrequently: true}}); c2d.drawImage(c, 0, 0); \
+         return {}.map((middle) => {{ \
+           const {{data}} = c2d.getImageData(Math.round(middle * c.width) - 6, 0, 12, c.height - 20); \
+           let [sum, count] = [0, 0]; \
+           for (let i = 0; i < data.length; i += 4) {{ \
+             const [most, least] = [Math.max, Math.min].map((of) => of(...data.slice(i, i + 3))); \
+             if (data[i + 3] < 120 || (most > 110 && most - least < 60)) continue; \
+             sum += Math.floor(i / 48); count++; }} \
+           return count ? sum / count : null; }}); }})()",
+        json!(middles)
+    ));
+    heights.as_array().expect("heights").iter().map(Value::as_f64).collect()
+}
+
+/// Writes a log of an array whose predictions are from a pose 4 cm away.
+fn write_displaced_array(folder: &Path) {
+    let log = folder.join("log");
+    fs::create_dir_all(&log).expect("there is room");
+    let [raw, log] = [folder.join("raw.jsonl"), log.join("sonard-20260102T000000Z.jsonl")];
+    let [raw, log] = [&raw, &log].map(|path| path.to_str().expect("plain"));
+    let scene = ["--scene", "mcgill-lab", "--pose"];
+    let simulate = ["fig4", "--array", "pioneer-8", "--output", raw];
+    let predict = ["3.44,1.46,2", "--output", log];
+    for command in [
+        [&["simulate"][..], &scene, &simulate].concat(),
+        [&["predict", raw][..], &scene, &predict].concat(),
+    ] {
+        let output = run(&command);
+        assert!(output.status.success(), "{}", stderr(&output));
+    }
+}
+
 /// Writes a log of a ring of twelve sonars that is turned in place and fired three times.
 fn write_turned_ring(folder: &Path) {
     let log = folder.join("log");

@@ -16,7 +16,7 @@ export function millimetres(m) {
   const size = Math.abs(1e3 * m).toFixed(1);
   return `${size === "0.0" ? "" : m < 0 ? "−" : "+"}${size} mm`;
 }
-export const degrees = (deg) => `${deg.toFixed(1)}°`;
+export const degrees = (deg) => `${(deg.toFixed(1) === "-0.0" ? 0 : deg).toFixed(1)}°`;
 export const decibels = (db) => `${db < 0 ? "−" : "+"}${Math.abs(db).toFixed(1)} dB`;
 
 /** A number with its noun in singular or plural. */

@@ -4,7 +4,7 @@
 import { requestJson } from "./api.js";
 import { make } from "./dom.js";
 import { rounded } from "./ranger.js";
-import { count, failure, sentences, setText } from "./format.js";
+import { count, degrees, failure, sentences, setText } from "./format.js";
 
 export class Locator {
   /**
@@ -15,12 +15,15 @@ export class Locator {
   constructor(section, plan, propose) {
     this.plan = plan;
     this.propose = propose;
+    /** Scan that was or is being located. @type {string | null} */
+    this.scan = null;
     /** Scan of the estimate, and the most probable pose. @type {{scan: string, pose: any} | null} */
     this.located = null;
     this.button = make("button", { type: "button", id: "locate", textContent: "Locate" });
     this.use = make("button", { type: "button", id: "use-pose", className: "writes", textContent: "Use this pose", hidden: true });
     this.result = make("span", { id: "located", role: "status", className: "hint" });
-    section.append(make("p", { className: "row" }, this.button, this.result, this.use));
+    this.causes = make("ul", { id: "causes", className: "hint" });
+    section.append(make("p", { className: "row" }, this.button, this.result, this.use), this.causes);
     this.button.addEventListener("click", () => this.locate());
     this.use.addEventListener("click", () => this.proposePose());
     plan.overlays.push(this);
@@ -29,22 +32,27 @@ export class Locator {
   async locate() {
     const { scan } = this.plan;
     if (!scan || scan.running) return setText(this.result, "Locate takes a complete scan.");
+    this.scan = scan.id;
     this.show(null, "Locating …");
     this.button.disabled = true;
     try {
-      const { poses, unavailable_reason } = await requestJson(`/v1/scans/${scan.id}/location`);
+      const { poses, causes, unavailable_reason } = await requestJson(`/v1/scans/${scan.id}/location`);
+      if (this.scan !== scan.id) return;
       const pose = nearestOf(poses, scan.start.pose);
-      if (pose) this.show({ scan: scan.id, pose }, poseText(pose, poses.length));
-      else this.show(null, sentences(unavailable_reason ?? "no pose of the scene fits the readings; `sonard locate` lists possible causes"));
+      // A pose that explains few readings is not drawn or proposed.
+      if (pose && !causes.length) this.show({ scan: scan.id, pose }, poseText(pose, poses.length));
+      else this.show(null, unavailable_reason ? sentences(unavailable_reason) : "No pose fits the readings. Possible causes:", causes);
     } catch (/** @type {any} */ error) {
       this.show(null, failure("Not located", error));
+    } finally {
+      this.button.disabled = false;
     }
-    this.button.disabled = false;
   }
 
-  show(located, text) {
+  show(located, text, causes = []) {
     this.located = located;
     setText(this.result, text);
+    this.causes.replaceChildren(...causes.map((cause) => make("li", { textContent: sentences(cause) })));
     this.use.hidden = !located;
     this.plan.drawOver();
     this.plan.onView();
@@ -52,7 +60,9 @@ export class Locator {
 
   /** Forgets the estimate of a scan that is no longer shown. */
   update() {
-    if (this.located && this.located.scan !== this.plan.scan?.id) this.show(null, "");
+    if (!this.scan || this.scan === this.plan.scan?.id) return;
+    this.scan = null;
+    this.show(null, "");
   }
 
   proposePose() {
@@ -76,7 +86,7 @@ function nearestOf(poses, { x_m, y_m }) {
 }
 
 function poseText({ x_m, y_m, heading_deg, probability, sigma_x_m, sigma_y_m, sigma_heading_deg, explained }, hypotheses) {
-  const sigmas = `±${(1e3 * Math.max(sigma_x_m, sigma_y_m)).toFixed(1)} mm, ±${sigma_heading_deg.toFixed(2)}°`;
+  const sigmas = `±${(1e3 * Math.max(sigma_x_m, sigma_y_m)).toFixed(2)} mm, ±${sigma_heading_deg.toFixed(2)}°`;
   const others = hypotheses > 1 ? `; ${count(hypotheses - 1, "other pose")} possible` : "";
-  return `(${x_m.toFixed(3)}, ${y_m.toFixed(3)}) m, heading ${heading_deg.toFixed(1)}°, ${sigmas}; probability ${probability.toFixed(2)}, ${(100 * explained).toFixed(0)} % of the readings explained${others}`;
+  return `(${x_m.toFixed(3)}, ${y_m.toFixed(3)}) m, heading ${degrees(heading_deg)}, ${sigmas}; probability ${probability.toFixed(2)}, ${(100 * explained).toFixed(0)} % of the readings explained${others}`;
 }

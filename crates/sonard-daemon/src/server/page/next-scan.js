@@ -87,7 +87,8 @@ export class NextScan {
     this.fault = make("tr", { className: "fault", hidden: true }, make("td", { colSpan: 4, id: "next-fault" }));
     this.message = make("p", { id: "next-status", className: "hint", role: "status" });
     this.buttons = make("p", { className: "buttons", hidden: true }, this.applyButton);
-    section.append(this.table, this.message, this.buttons);
+    const hint = make("p", { className: "draft hint", textContent: "Drag the robot on the plan, or type values." });
+    section.append(hint, this.table, this.message, this.buttons);
     section.querySelector(".head").append(this.editButton);
     this.section = section;
     this.ranger = null;

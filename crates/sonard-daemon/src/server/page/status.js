@@ -102,8 +102,8 @@ function showHealth(status, health) {
     ["Scans", `${scans.completed} completed, ${scans.stopped} stopped, ${scans.failed} failed`],
     ["Beams", `${scans.beams} measured, ${scans.missing} missing`],
     ...ofDevice(
-      ["Serial link", `${line.crc_errors} checksum errors, ${line.framing_errors} framing errors`],
-      ["Repairs", `${line.retries} retries, ${line.repaired} readings re-requested`],
+      ["Serial link", `${format.count(line.crc_errors, "checksum error")}, ${format.count(line.framing_errors, "framing error")}`],
+      ["Repairs", `${format.count(line.retries, "repeated request")}, ${line.repaired} readings re-requested`],
       ["Losses", `${format.count(line.losses, "disconnect")}, ${format.count(scans.restarts, "device reset")}`],
       ["Clock", `${quantity(clock.drift_ppm, "ppm")} drift, ${quantity(clock.sigma_us, "µs")} sigma`],
     ),

@@ -1,6 +1,7 @@
 // Residuals of a scan versus azimuth: measured minus predicted range.
 
 import { make } from "./dom.js";
+import { setText } from "./format.js";
 import { drawVertical } from "./layers.js";
 import { MARKS, draw } from "./verdicts.js";
 
@@ -12,9 +13,10 @@ const CAPTION = "measured − predicted (mm) vs azimuth; band ±10 mm; line: sel
 export class Strip {
   /** `onPick(index)` is called with the clicked beam. */
   constructor(section, onPick) {
-    const canvas = make("canvas", { id: "strip", role: "img", ariaLabel: `Residual: ${CAPTION}` });
+    const canvas = make("canvas", { id: "strip", role: "img" });
     this.title = make("h2", { textContent: "Residual" });
-    this.caption = make("p", { textContent: CAPTION });
+    this.caption = make("p");
+    this.text = CAPTION;
     this.section = section;
     section.append(make("div", { className: "head" }, this.title, this.caption), canvas);
     this.c = canvas.getContext("2d");
@@ -45,6 +47,9 @@ export class Strip {
   redraw(palette = this.palette) {
     this.palette = palette;
     this.section.hidden = this.isEmpty();
+    const text = this.rangers ? this.text.replace("azimuth", "ranger") : this.text;
+    setText(this.caption, text);
+    this.c.canvas.ariaLabel = `${this.title.textContent}: ${text}`;
     if (!this.width) return;
     this.setScale();
     this.c.clearRect(0, 0, this.width, this.height);
@@ -80,8 +85,7 @@ export class Strip {
   /** Sets the plotted value, by default the residual; takes effect with the next redraw. */
   show(valueOf = (ping) => ping.residual_m, title = "Residual", caption = CAPTION) {
     this.valueOf = valueOf;
-    [this.title.textContent, this.caption.textContent] = [title, caption];
-    this.c.canvas.ariaLabel = `${title}: ${caption}`;
+    [this.title.textContent, this.text] = [title, caption];
   }
 
   select(ping) {

@@ -54,8 +54,8 @@ struct CourseQuery {
     drift_m_per_m: Option<f64>,
     #[serde(default)]
     drift_deg_per_m: Option<f64>,
-    #[serde(default)]
-    carried: Option<f64>,
+    #[serde(default, alias = "carried")]
+    kidnap_probability: Option<f64>,
 }
 
 pub(super) fn endpoints() -> Vec<Route> {
@@ -92,9 +92,9 @@ pub(super) fn endpoints() -> Vec<Route> {
         )
         .parameter(
             "query",
-            "carried",
+            "kidnap_probability",
             up_to(1.0),
-            "Probability that the robot was carried elsewhere between two scans; default 0.02",
+            "Probability that the robot was displaced between two scans; default 0.02",
         )
         .responds_as::<Location>(
             200,
@@ -166,7 +166,12 @@ fn odometry(query: CourseQuery) -> Result<Odometry, ApiError> {
             defaults.drift_deg_per_m,
             180.0,
         )?,
-        kidnap_probability: within("carried", query.carried, defaults.kidnap_probability, 1.0)?,
+        kidnap_probability: within(
+            "kidnap_probability",
+            query.kidnap_probability,
+            defaults.kidnap_probability,
+            1.0,
+        )?,
     })
 }
 
@@ -351,11 +356,13 @@ impl ScanLocator {
         };
         let poses = poses.map_err(|error| error.to_string())?;
         let diagnoses = diagnose(&world, atlas, &sweep, &poses);
-        Ok(Location { scan: sweep.scan, poses, diagnoses, unavailable_reason: None })
+        let causes = diagnoses.iter().map(|cause| format!("{cause}; {}", cause.advice())).collect();
+        Ok(Location { scan: sweep.scan, poses, diagnoses, causes, unavailable_reason: None })
     }
 }
 
 /// Result for a scan that could not be located.
-const fn unlocated(scan: Uuid, why: String) -> Location {
-    Location { scan, poses: Vec::new(), diagnoses: Vec::new(), unavailable_reason: Some(why) }
+fn unlocated(scan: Uuid, why: String) -> Location {
+    let (poses, diagnoses, causes) = (Vec::new(), Vec::new(), Vec::new());
+    Location { scan, poses, diagnoses, causes, unavailable_reason: Some(why) }
 }
