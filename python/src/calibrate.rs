@@ -48,8 +48,9 @@ const DEFAULT_FIT: [&str; 3] = ["pose", "air", "threshold"];
 ///     Parameter groups to fit: ``"pose"`` (of each scan), ``"heading"`` and ``"gear"`` of the
 ///     stepper, ``"mounting"``, ``"height"``, ``"air"`` (speed of sound), ``"delay"``,
 ///     ``"threshold"``, ``"rise"`` (of the threshold with range), ``"beam"``, ``"skirts"`` (side
-///     lobes), ``"pulse"`` (rise time), ``"materials"``, ``"roughness"``, ``"walls"``; ``sonard
-///     calibrate --help`` describes them.
+///     lobes), ``"pulse"`` (rise time), ``"materials"``, ``"roughness"``, ``"walls"``,
+///     ``"turns"`` and ``"ends"`` of walls, ``"posts"`` (cylinders); ``sonard calibrate --help``
+///     describes them.
 /// priors : dict of str to float, optional
 ///     Standard deviation of the prior of a parameter, in its unit, by the name of its estimate.
 ///     Defaults to that of the command.

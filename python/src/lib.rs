@@ -9,6 +9,7 @@ mod calibrate;
 mod error;
 mod firing;
 mod generate;
+mod images;
 mod json;
 mod locate;
 mod log;
@@ -37,6 +38,7 @@ mod _sonard {
             SonardError, TooManyPathsError,
         },
         generate::generate,
+        images::image_sources,
         locate::Locator,
         log::{Log, Scan, read_log},
         map::make_map,

@@ -100,6 +100,9 @@ Parameters (--fit), each with its default prior:
   materials   reflectance of each material, as a logarithm (0.1)
   roughness   roughness of each material (0.1)
   walls       each wall along its normal (0.05 m)
+  turns       turn_deg of each wall about its middle; corners follow (2 degrees)
+  ends        each free end of a wall along the wall, outwards (0.05 m)
+  posts       x_m, y_m (0.05 m) and radius_m (0.02 m) of each cylinder
 
 Examples:
   sonard simulate --scene simple-room --pose 0.80,0.05,92 --temperature-c 15 -o room.jsonl

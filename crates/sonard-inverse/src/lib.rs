@@ -47,7 +47,7 @@ pub use hypothesis::{Hypotheses, LogLikelihood};
 pub use likelihood::ErrorModel;
 pub use locate::{NuisanceEstimate, PoseMode, locate, locate_observed};
 pub use motion::{SceneMotion, length_derivative};
-pub use parameter::Parameter;
+pub use parameter::{EndOfWall, Parameter, PostPart};
 pub use parameter_groups::{GroupError, ParameterGroup, name, priors};
 pub use progress::{FitObserver, FitProgress, NoObserver};
 pub use report::ParameterReport;

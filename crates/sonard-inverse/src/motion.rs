@@ -1,6 +1,10 @@
 //! Derivative of the length of a propagation path with respect to motion of the scene or
 //! transducer.
 
+mod height;
+mod post;
+mod scattered;
+
 use glam::DVec3;
 use sonard_model::{
     geometry::DVec2,
@@ -67,7 +71,7 @@ impl SceneMotion {
             Mechanism::Diffraction(Diffractor::Upright(Edge { wall, at_b })) => {
                 self.of_wall(wall)[usize::from(at_b)]
             }
-            // The logged path length extends to the axis of the post.
+            // The path runs to the axis of the post.
             Mechanism::Diffraction(Diffractor::Post { cylinder }) => {
                 self.of_cylinder(cylinder).map_or(DVec2::ZERO, |(velocity, _)| velocity)
             }
@@ -102,8 +106,9 @@ impl SceneMotion {
 ///
 /// A path is stationary in the points of its interactions (Fermat), so only explicit motion counts:
 /// `dL = sum dp . (u_in - u_out)` with the unit directions of propagation before and after each
-/// point, and `-u . dx` for an end with departure or arrival direction `u`. Tests verify finite
-/// differences to 1e-5, relative to a metre per unit.
+/// point, and `-u . dx` for an end with departure or arrival direction `u`. A scattered path is not
+/// stationary: it ends at the strip of a rough wall under the beam, in a fixed direction of
+/// departure. A pulse from a post returns from its surface. Tests verify finite differences to 1e-5, relative to a metre per unit.
 #[must_use]
 pub fn length_derivative(
     path: &Path,
@@ -119,6 +124,9 @@ pub fn length_derivative(
     else {
         return 0.0;
     };
+    if let Some(strip) = scattered::strip(path) {
+        return scattered::length_derivative(path, strip, ends, z_m, scene, motion);
+    }
     let toward = |from: DVec3, to: DVec3| (to - from).normalize_or_zero();
     let velocity = |velocity: DVec2| velocity.extend(motion.up);
     let mut rate = -toward(transmitter, point(0)).dot(velocity(motion.transducer[0]))
@@ -133,5 +141,11 @@ pub fn length_derivative(
         let turn = toward(before, point(at)) - toward(point(at), after);
         rate += turn.dot(velocity);
     }
-    rate
+    match post::PostContact::find(path) {
+        Some(post) => {
+            let rise = height::rise(path, ends, z_m, motion);
+            rate - post.lead_derivative(path, ends, scene, motion, (&rise, rate))
+        }
+        None => rate,
+    }
 }

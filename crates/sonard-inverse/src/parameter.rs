@@ -43,6 +43,56 @@ pub enum Parameter {
     /// Displacement of a wall along its normal, to the left from its first to its second end, by
     /// its index in the scene; metres.
     Wall(usize),
+    /// Rotation of a wall about its middle, counter-clockwise, by its index in the scene; degrees.
+    WallTurn(usize),
+    /// Displacement of an end of a wall along the wall, outwards, by the wall's index in the scene;
+    /// metres. Walls joined to the end follow it.
+    WallEnd(usize, EndOfWall),
+    /// Position or radius of a cylinder, by its index in the scene; metres.
+    Post(usize, PostPart),
+}
+
+/// End of a wall.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum EndOfWall {
+    /// First end.
+    A,
+    /// Second end.
+    B,
+}
+
+/// Dimension of a cylinder.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum PostPart {
+    /// Centre along x.
+    X,
+    /// Centre along y.
+    Y,
+    /// Radius.
+    Radius,
+}
+
+impl EndOfWall {
+    /// Name of the end in a scene.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::A => "a",
+            Self::B => "b",
+        }
+    }
+}
+
+impl PostPart {
+    /// Name of the dimension, with its unit.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::X => "x_m",
+            Self::Y => "y_m",
+            Self::Radius => "radius_m",
+        }
+    }
 }
 
 impl Parameter {
@@ -61,6 +111,9 @@ impl Parameter {
             Self::X(_) | Self::Y(_) | Self::Ahead | Self::Left | Self::Wall(_) | Self::Height => {
                 0.04
             }
+            Self::WallEnd(..) | Self::Post(_, PostPart::X | PostPart::Y) => 0.04,
+            Self::Post(_, PostPart::Radius) => 0.02,
+            Self::WallTurn(_) => 1.0,
             Self::Heading(_) | Self::HeadingZero => 3.0,
             Self::Gear => 0.02,
             Self::SoundSpeed => 0.015,
@@ -94,6 +147,9 @@ impl fmt::Display for Parameter {
             Self::Reflectance(material) => write!(f, "reflectance {material}"),
             Self::Roughness(material) => write!(f, "roughness {material}"),
             Self::Wall(wall) => write!(f, "wall {wall}"),
+            Self::WallTurn(wall) => write!(f, "wall {wall} turn_deg"),
+            Self::WallEnd(wall, end) => write!(f, "wall {wall} end {}", end.name()),
+            Self::Post(post, part) => write!(f, "cylinder {post} {}", part.name()),
         }
     }
 }

@@ -4,7 +4,12 @@ use serde::{Deserialize, Serialize};
 use sonard_model::acoustics::Aperture;
 use thiserror::Error;
 
-use crate::{fit::Prior, parameter::Parameter, world::World};
+use crate::{
+    fit::Prior,
+    parameter::{Parameter, PostPart},
+    walls,
+    world::World,
+};
 
 /// Group of parameters that are fitted together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -41,6 +46,12 @@ pub enum ParameterGroup {
     Roughness,
     /// Position of each wall.
     Walls,
+    /// Orientation of each wall.
+    Turns,
+    /// Position of each free end of a wall along it.
+    Ends,
+    /// Position and radius of each cylinder.
+    Posts,
 }
 
 /// Invalid selection of parameters or priors.
@@ -104,20 +115,29 @@ const fn default_sigma(parameter: &Parameter) -> f64 {
         Parameter::Aperture => 0.3,
         Parameter::Bandwidth => 0.5,
         Parameter::Reflectance(_) | Parameter::Roughness(_) => 0.1,
-        Parameter::Wall(_) => 0.05,
+        Parameter::Wall(_) | Parameter::WallEnd(..) => 0.05,
+        Parameter::WallTurn(_) => 2.0,
+        Parameter::Post(_, PostPart::X | PostPart::Y) => 0.05,
+        Parameter::Post(_, PostPart::Radius) => 0.02,
     }
 }
 
-/// User-facing name of a parameter; walls are named by their id.
+/// User-facing name of a parameter; walls and cylinders are named by their id.
 #[must_use]
 pub fn name(parameter: &Parameter, world: &World) -> String {
-    match parameter {
-        Parameter::Wall(wall) => match world.scene.walls.get(*wall) {
-            Some(wall) => format!("wall {}", wall.id),
-            None => parameter.to_string(),
-        },
-        _ => parameter.to_string(),
-    }
+    let scene = &world.scene;
+    let wall = |at: usize| scene.walls.get(at).map(|wall| &*wall.id);
+    let named = match parameter {
+        Parameter::Wall(at) => wall(*at).map(|id| format!("wall {id}")),
+        Parameter::WallTurn(at) => wall(*at).map(|id| format!("wall {id} turn_deg")),
+        Parameter::WallEnd(at, end) => wall(*at).map(|id| format!("wall {id} end {}", end.name())),
+        Parameter::Post(at, part) => {
+            let cylinder = scene.cylinders.get(*at);
+            cylinder.map(|cylinder| format!("cylinder {} {}", cylinder.id, part.name()))
+        }
+        _ => None,
+    };
+    named.unwrap_or_else(|| parameter.to_string())
 }
 
 /// Priors of all parameters of some groups for a number of sweeps. Standard deviations are those
@@ -188,5 +208,15 @@ fn of_group(
             world.scene.materials.keys().cloned().map(Parameter::Roughness).collect()
         }
         ParameterGroup::Walls => (0..world.scene.walls.len()).map(Parameter::Wall).collect(),
+        ParameterGroup::Turns => (0..world.scene.walls.len()).map(Parameter::WallTurn).collect(),
+        ParameterGroup::Ends => {
+            let free = walls::free_ends(&world.scene).into_iter();
+            free.map(|(wall, end)| Parameter::WallEnd(wall, end)).collect()
+        }
+        ParameterGroup::Posts => {
+            let parts = [PostPart::X, PostPart::Y, PostPart::Radius];
+            let of = |post| parts.map(|part| Parameter::Post(post, part));
+            (0..world.scene.cylinders.len()).flat_map(of).collect()
+        }
     })
 }

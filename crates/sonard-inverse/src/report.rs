@@ -7,7 +7,7 @@ use uuid::Uuid;
 
 use crate::{
     fit::{FitOptions, FitResult, ParameterEstimate, Prior, Search},
-    parameter::Parameter,
+    parameter::{Parameter, PostPart},
     parameter_groups::name,
     sweep::FitSweep,
     world::World,
@@ -202,6 +202,14 @@ fn value(world: &World, sweeps: &[FitSweep], parameter: &Parameter, by: f64) -> 
         Parameter::Roughness(name) => {
             world.scene.materials.get(name).map_or(by, |material| material.roughness + by)
         }
-        Parameter::Wall(_) => by,
+        Parameter::Wall(_) | Parameter::WallTurn(_) | Parameter::WallEnd(..) => by,
+        Parameter::Post(post, part) => {
+            let known = world.scene.cylinders.get(*post);
+            by + known.map_or(0.0, |cylinder| match part {
+                PostPart::X => cylinder.center.x,
+                PostPart::Y => cylinder.center.y,
+                PostPart::Radius => cylinder.radius_m,
+            })
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Parameters and poses recovered from simulated readings.
 
 mod candidates;
+mod changes;
 mod checkpoint;
 mod coarse;
 mod course;

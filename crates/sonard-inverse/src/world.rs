@@ -13,9 +13,15 @@ use thiserror::Error;
 
 use crate::{
     motion::SceneMotion,
-    parameter::Parameter,
-    walls::{self, moved_ends},
+    parameter::{EndOfWall, Parameter, PostPart},
+    walls::{self, WallChange, moved_ends},
 };
+
+/// Maximum share of its length by which a wall is shortened at an end.
+const MAX_SHORTENED: f64 = 0.9;
+
+/// Minimum radius of a fitted cylinder, metres.
+const MIN_RADIUS_M: f64 = 0.001;
 
 /// Scene, sensor, air and stepper.
 #[derive(Debug, Clone)]
@@ -102,7 +108,8 @@ impl World {
     /// Air outside the valid ranges.
     pub fn changed(&self, changes: &[(&Parameter, f64)]) -> Result<Self, WorldError> {
         let mut world = self.clone();
-        let mut offsets_m = Vec::new();
+        let mut changes_of_walls: BTreeMap<usize, WallChange> = BTreeMap::new();
+        let mut cylinders = self.scene.cylinders.clone();
         let mut materials: BTreeMap<&str, Material> = BTreeMap::new();
         for &(parameter, by) in changes {
             let (min, max) = self.limits(parameter);
@@ -143,18 +150,38 @@ impl World {
                         }
                     }
                 }
-                Parameter::Wall(wall) => offsets_m.push((*wall, by)),
+                Parameter::Wall(wall) => {
+                    changes_of_walls.entry(*wall).or_default().offset_m += by;
+                }
+                Parameter::WallTurn(wall) => {
+                    changes_of_walls.entry(*wall).or_default().turn_rad += by.to_radians();
+                }
+                Parameter::WallEnd(wall, end) => {
+                    let [a, b] = &mut changes_of_walls.entry(*wall).or_default().longer_m;
+                    *(if *end == EndOfWall::A { a } else { b }) += by;
+                }
+                Parameter::Post(post, part) => {
+                    if let Some(cylinder) = cylinders.get_mut(*post) {
+                        match part {
+                            PostPart::X => cylinder.center.x += by,
+                            PostPart::Y => cylinder.center.y += by,
+                            PostPart::Radius => cylinder.radius_m += by,
+                        }
+                    }
+                }
             }
         }
-        if !offsets_m.is_empty() || !materials.is_empty() {
-            world.scene = Arc::new(changed_scene(&self.scene, &offsets_m, &materials));
+        let walls: Vec<_> = changes_of_walls.into_iter().collect();
+        if !walls.is_empty() || !materials.is_empty() || cylinders != self.scene.cylinders {
+            let scene = Scene { cylinders, ..Scene::clone(&self.scene) };
+            world.scene = Arc::new(changed_scene(&scene, &walls, &materials));
         }
         Ok(world)
     }
 
     /// Minimum and maximum change of a parameter: the threshold does not fall with range, the
-    /// side-lobe floor is not above the axis, and no material reflects or scatters more than it
-    /// receives.
+    /// side-lobe floor is not above the axis, no material reflects or scatters more than it
+    /// receives, and no wall or cylinder vanishes.
     #[must_use]
     pub fn limits(&self, parameter: &Parameter) -> (f64, f64) {
         let (min, max) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -172,6 +199,14 @@ impl World {
                 let known = self.scene.materials.get(name);
                 known.map_or((min, max), |material| (-material.roughness, 1.0 - material.roughness))
             }
+            Parameter::WallEnd(wall, _) => {
+                let known = self.scene.walls.get(*wall);
+                (known.map_or(min, |wall| MAX_SHORTENED * -wall.a.distance(wall.b)), max)
+            }
+            Parameter::Post(post, PostPart::Radius) => {
+                let known = self.scene.cylinders.get(*post);
+                (known.map_or(min, |cylinder| (MIN_RADIUS_M - cylinder.radius_m).min(0.0)), max)
+            }
             _ => (min, max),
         }
     }
@@ -188,12 +223,35 @@ impl World {
             Parameter::X(_) => Some(self.with_body(DVec2::X)),
             Parameter::Y(_) => Some(self.with_body(DVec2::Y)),
             Parameter::Height => Some(SceneMotion { up: 1.0, ..SceneMotion::default() }),
-            Parameter::Wall(wall) => Some(SceneMotion {
-                walls: walls::velocities(&self.scene, *wall),
-                ..SceneMotion::default()
-            }),
+            Parameter::Wall(wall) => {
+                Some(self.with_wall(*wall, &WallChange { offset_m: 1.0, ..WallChange::default() }))
+            }
+            Parameter::WallTurn(wall) => {
+                let turn_rad = 1f64.to_radians();
+                Some(self.with_wall(*wall, &WallChange { turn_rad, ..WallChange::default() }))
+            }
+            Parameter::WallEnd(wall, end) => {
+                let longer_m =
+                    [EndOfWall::A, EndOfWall::B].map(|of| f64::from(u8::from(of == *end)));
+                Some(self.with_wall(*wall, &WallChange { longer_m, ..WallChange::default() }))
+            }
+            Parameter::Post(post, part) => {
+                let (velocity, growth) = match part {
+                    PostPart::X => (DVec2::X, 0.0),
+                    PostPart::Y => (DVec2::Y, 0.0),
+                    PostPart::Radius => (DVec2::ZERO, 1.0),
+                };
+                let cylinders = vec![(*post as u32, velocity, growth)];
+                Some(SceneMotion { cylinders, ..SceneMotion::default() })
+            }
             _ => None,
         }
+    }
+
+    /// Motion by a change of a wall, per unit.
+    fn with_wall(&self, wall: usize, unit: &WallChange) -> SceneMotion {
+        let walls = walls::velocities(&self.scene, wall, unit);
+        SceneMotion { walls, ..SceneMotion::default() }
     }
 
     /// Motion of the transducer by a parameter for a firing; `None` if it changes no length.
@@ -311,12 +369,12 @@ fn scale_aperture(aperture: &mut Aperture, by: f64) {
 
 fn changed_scene(
     scene: &Scene,
-    offsets_m: &[(usize, f64)],
+    changes: &[(usize, WallChange)],
     materials: &BTreeMap<&str, Material>,
 ) -> Scene {
     let mut changed = scene.clone();
-    if !offsets_m.is_empty() {
-        for (wall, [a, b]) in changed.walls.iter_mut().zip(moved_ends(scene, offsets_m)) {
+    if !changes.is_empty() {
+        for (wall, [a, b]) in changed.walls.iter_mut().zip(moved_ends(scene, changes)) {
             (wall.a, wall.b) = (a, b);
         }
     }

@@ -10,6 +10,7 @@ mod cost;
 mod crosstalk;
 mod engine;
 mod fan;
+mod image_sources;
 mod lazy;
 mod names;
 mod observation;
@@ -27,6 +28,7 @@ pub use cone::Cone;
 pub use cost::{SearchPart, TooCostly};
 pub use engine::{Arrival, Arrivals, Engine};
 pub use fan::{Fan, FanSettings};
+pub use image_sources::{BoxRoom, ImageSourceError, ImageSources, image_sources};
 pub use names::FACE_NAME;
 pub use observation::{FiringArrivals, ObservationPoint};
 pub use options::{

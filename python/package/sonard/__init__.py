@@ -39,11 +39,12 @@ from ._sonard import (
     calibrate,
     compare,
     generate,
+    image_sources,
     interpret,
     read_log,
 )
 from ._sonard import map as map
-from ._results import Calibration, Estimate, Map, Path, Peak, Reading, Trace
+from ._results import Calibration, Estimate, ImageSources, Map, Path, Peak, Reading, Trace
 from ._status import Status
 
 # Without `map`, which would replace the built-in function in a star import.
@@ -58,6 +59,7 @@ __all__ = [
     "Calibration",
     "Course",
     "Estimate",
+    "ImageSources",
     "Locator",
     "Log",
     "LogError",
@@ -82,6 +84,7 @@ __all__ = [
     "calibrate",
     "compare",
     "generate",
+    "image_sources",
     "interpret",
     "read_log",
 ]

@@ -136,6 +136,34 @@ class Map:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
+class ImageSources:
+    """Image sources that receivers see: one entry for each image and receiver, by receiver and then by delay."""
+
+    receivers: NDArray[np.uint32]
+    """Index of the receiver among all given ones, in row-major order: shape (images,)."""
+    positions_m: NDArray[np.float64]
+    """Positions of the images, metres; z is 0 in a planar room: shape (images, 3)."""
+    delays_s: NDArray[np.float64]
+    """Times of flight, seconds: shape (images,)."""
+    amplitudes: NDArray[np.float64]
+    """Reflectances over ``4 pi`` times the length of the path, per metre: shape (images,)."""
+    reflectances: NDArray[np.float64]
+    """Product of the reflectances along the path: shape (images,)."""
+    orders: NDArray[np.uint16]
+    """Numbers of reflections: shape (images,)."""
+    walls: NDArray[np.int32]
+    """Reflecting surfaces in order from the source, filled up with -1: shape (images, largest order). Surfaces are
+    numbered as the walls of the scene (of a box: at y = 0, largest x, largest y, x = 0), then floor and ceiling."""
+
+    def __len__(self) -> int:
+        return self.orders.size
+
+    def __repr__(self) -> str:
+        receivers = np.unique(self.receivers).size
+        return f"<ImageSources: {len(self)} images up to order {self.orders.max(initial=0)} at {receivers} receivers>"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Estimate:
     """Fitted parameter with its uncertainty."""
 

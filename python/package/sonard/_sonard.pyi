@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Literal, final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._results import Calibration, Map, Path, Reading, Trace
+from ._results import Calibration, ImageSources, Map, Path, Reading, Trace
 
 __all__ = [
     "ARRAY_READING",
@@ -36,6 +36,7 @@ __all__ = [
     "calibrate",
     "compare",
     "generate",
+    "image_sources",
     "interpret",
     "map",
     "read_log",
@@ -427,6 +428,15 @@ def generate(
     part: tuple[int, int] | None = None,
     threads: int | None = None,
 ) -> dict[str, Any]: ...
+def image_sources(
+    room: Scene | ArrayLike,
+    source: ArrayLike,
+    receivers: ArrayLike,
+    max_order: int,
+    *,
+    reflectance: ArrayLike | None = None,
+    sound_speed_m_s: float = 343.2,
+) -> ImageSources: ...
 def calibrate(
     scans: Log | Scan | Iterable[Log | Scan],
     model: Model | None = None,

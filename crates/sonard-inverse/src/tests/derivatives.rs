@@ -39,7 +39,7 @@ fn arrivals(world: &World, pose: &Pose, direction_rad: f64) -> BTreeMap<Key, Arr
 
 /// Compares derivatives with finite differences for all arrivals in some directions; returns their
 /// number.
-fn compare(
+pub(super) fn compare(
     name: &str,
     moved: impl Fn(f64) -> (World, Pose),
     motion: impl Fn(&World, f64) -> SceneMotion,
@@ -83,7 +83,7 @@ fn compare(
     compared
 }
 
-fn at(scene: &str) -> (World, Pose) {
+pub(super) fn at(scene: &str) -> (World, Pose) {
     // Up to 3 m: up to four reflections in a room.
     let mut world = world(scene, "senscomp-6500");
     world.options.max_range_m = Some(3.0);
@@ -264,7 +264,8 @@ fn moving_and_growing_cylinders() {
 fn displaced_wall_keeps_other_lines() {
     let scene = shipped("simple-room");
     for wall in 0..scene.walls.len() {
-        let moved = walls::moved_ends(&scene, &[(wall, 0.05)]);
+        let change = walls::WallChange { offset_m: 0.05, ..Default::default() };
+        let moved = walls::moved_ends(&scene, &[(wall, change)]);
         let normal = walls::normal(&scene.walls[wall]);
         let off = |point: DVec2| (point - scene.walls[wall].a).dot(normal);
         assert!(moved[wall].iter().all(|end| (off(*end) - 0.05).abs() < 1e-9), "{wall}");

@@ -109,6 +109,7 @@ mod floor;
 mod found;
 mod height;
 mod interactions;
+mod mirror_paths;
 mod pattern;
 mod prepare;
 mod rays;
@@ -122,7 +123,9 @@ mod transducer;
 
 pub(super) use crosstalk::{CrosstalkPaths, TransducerPose};
 pub use engine::PathEngine;
+pub(super) use floor::mirror_gain;
 pub use interactions::EchoPath;
+pub(super) use mirror_paths::MirrorPath;
 pub use prepare::Paths;
 pub use settings::{
     DEFAULT_MIN_AMPLITUDE, DEFAULT_REPEATED_CONTACT_RATIO, PathSettings, default_sensor_z_m,
