@@ -1,11 +1,15 @@
 //! Changes of a plan that are worth a trial.
 
+mod block;
+mod corner;
 mod hidden;
 
 use std::collections::BTreeSet;
 
 use sonard_model::geometry::Pose;
 
+use block::blocks;
+use corner::corners_at_points;
 pub(crate) use hidden::crosses;
 use hidden::uncover;
 
@@ -29,6 +33,7 @@ pub(crate) struct MoveFinder<'a> {
     plan: &'a LineArrangement,
     poses: &'a [Pose],
     cells: Vec<Vec<usize>>,
+    blocks: Vec<PlanMove>,
     /// Number of feet of perpendiculars on each piece.
     feet: Vec<usize>,
 }
@@ -49,7 +54,7 @@ impl<'a> MoveFinder<'a> {
                 feet[plan.piece(line, plan.piece_at(line, foot.along_m))] += 1;
             }
         }
-        Self { plan, poses, cells: cells(plan), feet }
+        Self { plan, poses, cells: cells(plan), blocks: blocks(plan, poses), feet }
     }
 
     /// All proposals for a set of walls, each once, that change it.
@@ -65,6 +70,9 @@ impl<'a> MoveFinder<'a> {
         }
         proposals.corners();
         proposals.invert(&self.cells);
+        let corners = corners_at_points(self.plan, walls, &proposals.runs);
+        proposals.found.extend(corners);
+        proposals.found.extend(self.blocks.iter().cloned());
         let hidden = uncover(self.plan, walls, &proposals.runs, self.poses);
         proposals.found.extend(hidden);
         unique(proposals.found, walls)
