@@ -66,7 +66,7 @@ impl<'a> MoveFinder<'a> {
             proposals.fill_gaps(line);
             proposals.at_feet(line, &self.feet);
             proposals.between_walls(line);
-            proposals.from_points(line);
+            proposals.walls_at_points(line);
         }
         proposals.corners();
         proposals.invert(&self.cells);
@@ -157,7 +157,7 @@ impl Proposals<'_> {
     }
 
     /// Walls between points on the line, and from a point to the next wall on either side.
-    fn from_points(&mut self, line: usize) {
+    fn walls_at_points(&mut self, line: usize) {
         /// Distance from a point to the piece beside it, metres.
         const BESIDE_M: f64 = 1e-4;
         let inner = self.plan.pieces_of(line).saturating_sub(2);

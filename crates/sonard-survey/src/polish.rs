@@ -10,7 +10,7 @@ use crate::{
     arc::quantile,
     judge::Judge,
     normal::{NormalEquations, move_pose, pose_column},
-    refine::{LineColumns, PosedPlan},
+    posed::{LineColumns, PosedPlan},
     trace::explain,
 };
 

@@ -13,14 +13,16 @@ use crate::{
     arrangement::{LineArrangement, Segment},
     bundle::{SupportedFeature, fit_feature},
     candidates::CandidateSources,
+    covariance::PlanCovariance,
     error::SurveyError,
     judge::Judge,
     line::{Line, off_square_rad, square_axis},
     odometry::{Move, OdometrySigma},
     polish::polish,
+    posed::PosedPlan,
     progress::{NoObserver, SurveyObserver, SurveyProgress, SurveyStage},
     readings::Readings,
-    refine::{PlanCovariance, PosedPlan, RefineSettings, refine},
+    refine::{RefineSettings, refine},
     report::report,
     result::{SearchEnd, Survey},
     search::{PlanSearch, initial_walls},
@@ -107,7 +109,7 @@ pub fn survey(
     let end = search.end();
     search.report_progress(SurveyStage::Alternatives);
     let assessment = search.settle();
-    Ok(report(sweeps, &search.posed, assessment, &search.covariance, &workspace, (end, options)))
+    Ok(report(sweeps, &search.posed, &assessment, &search.covariance, &workspace, (end, options)))
 }
 
 /// Score of given walls (pairs of ends, metres) and poses, nats, as that of a [`Survey`].

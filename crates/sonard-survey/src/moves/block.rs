@@ -1,4 +1,6 @@
-//! Closed blocks, such as boxes and pillars, that stand free in a room.
+//! Closed blocks, such as boxes and pillars, free in a room.
+
+use std::cmp::Reverse;
 
 use sonard_model::geometry::{DVec2, Pose, encloses};
 
@@ -31,7 +33,7 @@ pub(super) fn blocks(plan: &LineArrangement, poses: &[Pose]) -> Vec<PlanMove> {
             }
         }
     }
-    found.sort_by(|a, b| b.0.cmp(&a.0));
+    found.sort_by_key(|(points, _)| Reverse(*points));
     found.truncate(MAX_BLOCKS);
     found.into_iter().map(|(_, sides)| sides).collect()
 }
