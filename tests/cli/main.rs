@@ -35,6 +35,7 @@ mod scan_input;
 mod scene;
 mod scene_made;
 mod sparse_logs;
+mod survey;
 mod tamper;
 mod terminal;
 mod tour;

@@ -24,7 +24,7 @@ pub enum WallCertainty {
 /// Cause of an echo.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EchoCause {
-    /// One mirror reflection.
+    /// A single mirror reflection.
     First,
     /// Several mirror reflections.
     Multiple,

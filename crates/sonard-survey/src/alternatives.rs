@@ -5,7 +5,7 @@ use sonard_model::geometry::DVec2;
 use crate::{
     arrangement::{LineArrangement, PieceSet, Run, Segment},
     judge::Judge,
-    refine::PosedPlan,
+    posed::PosedPlan,
     result::{PieceStatus, WallPiece},
     search::{PlanSearch, ScoredPlan},
     trace::touched_pieces,
@@ -54,7 +54,7 @@ pub(crate) fn assess(posed: &PosedPlan, judge: &Judge) -> Assessment {
             .then(|| best_without(plan, judge, without, &best.walls, &run));
         let lead_nats = other.as_ref().map_or(evidence_nats, |other| best.score - other.score);
         if let Some(other) = other {
-            assessment.add(plan, &best, other);
+            assessment.add(plan, &best, &other);
         }
         let is_needed = lead_nats.min(evidence_nats) > IMPLIED_NATS;
         let pieces = pieces(plan, judge, &best, &run, &touched, is_needed);
@@ -66,7 +66,7 @@ pub(crate) fn assess(posed: &PosedPlan, judge: &Judge) -> Assessment {
 }
 
 impl Assessment {
-    fn add(&mut self, plan: &LineArrangement, best: &ScoredPlan, other: ScoredPlan) {
+    fn add(&mut self, plan: &LineArrangement, best: &ScoredPlan, other: &ScoredPlan) {
         let difference = other.score - best.score;
         let is_best = self.better.as_ref().is_none_or(|better| other.score > better.score);
         if difference > 0.5 && is_best {

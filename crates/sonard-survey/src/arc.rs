@@ -22,7 +22,7 @@ pub(crate) struct Arc {
     pub(crate) azimuth_deg: f64,
     /// Range, metres.
     pub(crate) range_m: f64,
-    /// Whether a nearer echo hides an end, so that the middle is biased.
+    /// Bias of the middle: a nearer echo hides an end.
     pub(crate) is_cut: bool,
     /// Indices of the beams in the sweep.
     pub(crate) beams: Vec<usize>,

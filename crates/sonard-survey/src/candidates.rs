@@ -1,6 +1,9 @@
 //! Lines on which walls are tried.
 
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::{
+    cmp::Reverse,
+    f64::consts::{FRAC_PI_2, PI},
+};
 
 use sonard_model::geometry::{DVec2, Pose, distance_to_segment, wrap_pi};
 
@@ -45,7 +48,7 @@ impl CandidateSources<'_> {
             add(&mut lines, line.clone(), center);
         }
         let mut of_features = self.open_lines();
-        of_features.sort_by(|a, b| b.support.cmp(&a.support));
+        of_features.sort_by_key(|line| Reverse(line.support));
         for line in of_features {
             add(&mut lines, line, center);
         }
@@ -98,7 +101,7 @@ impl CandidateSources<'_> {
     fn single_lines(&self) -> Vec<Line> {
         let mut left: Vec<&Arc> = self.left.unwrap_or_default().to_vec();
         left.retain(|arc| !arc.is_cut || arc.beams.len() >= MIN_CUT_BEAMS);
-        left.sort_by_key(|arc| std::cmp::Reverse(arc.beams.len()));
+        left.sort_by_key(|arc| Reverse(arc.beams.len()));
         let line = |arc: &&Arc| {
             let [feature, _] = VirtualFeature::of_arc(arc, &self.poses[arc.sweep]);
             Line::of_feature(&SupportedFeature { feature, arcs: vec![arc] }, self.poses)

@@ -24,8 +24,8 @@ pub struct CourseMap {
 
 /// Estimates the poses of sweeps of an unknown room, with their poses as odometry.
 ///
-/// Echoes of any order are landmarks: a mirror image of a wall is a line, a mirror image of a corner
-/// or an edge is a point. Standard deviations are those of the joint estimate of poses and features.
+/// Echoes of any order are landmarks: a mirror image of a wall is a line, a mirror image of a
+/// corner or an edge is a point. Standard deviations are those of the joint estimate.
 ///
 /// # Errors
 /// As [`survey`](crate::survey).

@@ -96,7 +96,7 @@ impl Line {
         off_rad.min(PI - off_rad)
     }
 
-    /// Returns `true` if both lines are one near a place: within 2 degrees, and within `tolerance_m`.
+    /// Returns `true` if both lines are one near a place: within 2 degrees and `tolerance_m`.
     pub(crate) fn is_same(&self, other: &Self, near: DVec2, tolerance_m: f64) -> bool {
         const SAME_RAD: f64 = 0.035;
         let foot = near - self.off_m(near) * self.normal();

@@ -1,11 +1,15 @@
 //! Changes of a plan that are worth a trial.
 
+mod block;
+mod corner;
 mod hidden;
 
 use std::collections::BTreeSet;
 
 use sonard_model::geometry::Pose;
 
+use block::blocks;
+use corner::corners_at_points;
 pub(crate) use hidden::crosses;
 use hidden::uncover;
 
@@ -29,6 +33,7 @@ pub(crate) struct MoveFinder<'a> {
     plan: &'a LineArrangement,
     poses: &'a [Pose],
     cells: Vec<Vec<usize>>,
+    blocks: Vec<PlanMove>,
     /// Number of feet of perpendiculars on each piece.
     feet: Vec<usize>,
 }
@@ -49,7 +54,7 @@ impl<'a> MoveFinder<'a> {
                 feet[plan.piece(line, plan.piece_at(line, foot.along_m))] += 1;
             }
         }
-        Self { plan, poses, cells: cells(plan), feet }
+        Self { plan, poses, cells: cells(plan), blocks: blocks(plan, poses), feet }
     }
 
     /// All proposals for a set of walls, each once, that change it.
@@ -61,10 +66,13 @@ impl<'a> MoveFinder<'a> {
             proposals.fill_gaps(line);
             proposals.at_feet(line, &self.feet);
             proposals.between_walls(line);
-            proposals.from_points(line);
+            proposals.walls_at_points(line);
         }
         proposals.corners();
         proposals.invert(&self.cells);
+        let corners = corners_at_points(self.plan, walls, &proposals.runs);
+        proposals.found.extend(corners);
+        proposals.found.extend(self.blocks.iter().cloned());
         let hidden = uncover(self.plan, walls, &proposals.runs, self.poses);
         proposals.found.extend(hidden);
         unique(proposals.found, walls)
@@ -149,7 +157,7 @@ impl Proposals<'_> {
     }
 
     /// Walls between points on the line, and from a point to the next wall on either side.
-    fn from_points(&mut self, line: usize) {
+    fn walls_at_points(&mut self, line: usize) {
         /// Distance from a point to the piece beside it, metres.
         const BESIDE_M: f64 = 1e-4;
         let inner = self.plan.pieces_of(line).saturating_sub(2);

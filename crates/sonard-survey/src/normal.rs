@@ -80,8 +80,8 @@ impl NormalEquations {
     }
 }
 
-/// Column of the x of a pose, followed by y and heading in radians; `None` for the first pose, which
-/// is the frame.
+/// Column of the x of a pose, followed by y and heading in radians; `None` for the first pose,
+/// which is the frame.
 pub(crate) const fn pose_column(pose: usize) -> Option<usize> {
     match pose.checked_sub(1) {
         Some(free) => Some(3 * free),

@@ -10,7 +10,7 @@ use crate::{
     arc::quantile,
     judge::Judge,
     normal::{NormalEquations, move_pose, pose_column},
-    refine::{LineColumns, PlanCovariance, PosedPlan},
+    posed::{LineColumns, PosedPlan},
     trace::explain,
 };
 
@@ -29,13 +29,9 @@ struct Linearized {
 }
 
 /// Improves poses and the distances of lines by the likelihood of all readings: ranges, missing
-/// echoes and the ends of arcs. Directions of lines remain. `known` gives their covariance; the
-/// result has that of everything else.
-pub(crate) fn polish(
-    posed: &mut PosedPlan,
-    judge: &Judge,
-    known: Option<PlanCovariance>,
-) -> Option<PlanCovariance> {
+/// echoes and the ends of arcs. Directions of lines remain. Returns the covariance of the poses and
+/// distances for these directions.
+pub(crate) fn polish(posed: &mut PosedPlan, judge: &Judge) -> Option<DMatrix<f64>> {
     let errors = error_model(posed, judge)?;
     let mut best = linearize(posed, judge, &errors)?;
     let mut damping = 1e-3;
@@ -53,12 +49,7 @@ pub(crate) fn polish(
             break;
         }
     }
-    let columns = LineColumns::new(posed);
-    let covariance = PlanCovariance::new(best.normal.covariance()?, columns);
-    Some(match known {
-        Some(known) => covariance.with_directions_of(&known),
-        None => covariance,
-    })
+    best.normal.covariance()
 }
 
 /// Error model with the observed scatter of ranges.

@@ -6,9 +6,10 @@ use sonard_model::{model::Prediction, reading::PathKind};
 use crate::{
     alternatives::{Assessment, JudgedWall},
     arrangement::LineArrangement,
+    covariance::PlanCovariance,
     judge::{Judge, outcome_of},
+    posed::PosedPlan,
     readings::{Beam, Outcome},
-    refine::{PlanCovariance, PosedPlan},
     result::{
         AlternativePlan, ReadingCause, SearchEnd, Survey, SurveyedEnd, SurveyedPose, SurveyedWall,
         UnexplainedArc,
@@ -21,7 +22,7 @@ use crate::{
 pub(crate) fn report(
     sweeps: &[FitSweep],
     posed: &PosedPlan,
-    assessment: Assessment,
+    assessment: &Assessment,
     covariance: &Option<PlanCovariance>,
     workspace: &Workspace,
     (end, options): (SearchEnd, &SurveyOptions),
@@ -38,7 +39,7 @@ pub(crate) fn report(
         readings.beams.iter().zip(predictions).map(|(beam, of)| cause(beam, of)).collect()
     });
     let covariance = covariance.as_ref();
-    let (alternatives, probability) = weighted(&assessment);
+    let (alternatives, probability) = weighted(assessment);
     Survey {
         walls: assessment
             .walls

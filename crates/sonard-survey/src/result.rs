@@ -116,7 +116,7 @@ pub struct UnexplainedArc {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ReadingCause {
-    /// One mirror reflection.
+    /// A single mirror reflection.
     First,
     /// Two or more mirror reflections.
     Multiple,

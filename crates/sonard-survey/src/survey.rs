@@ -13,14 +13,16 @@ use crate::{
     arrangement::{LineArrangement, Segment},
     bundle::{SupportedFeature, fit_feature},
     candidates::CandidateSources,
+    covariance::PlanCovariance,
     error::SurveyError,
     judge::Judge,
     line::{Line, off_square_rad, square_axis},
     odometry::{Move, OdometrySigma},
     polish::polish,
+    posed::PosedPlan,
     progress::{NoObserver, SurveyObserver, SurveyProgress, SurveyStage},
     readings::Readings,
-    refine::{PlanCovariance, PosedPlan, RefineSettings, refine},
+    refine::{RefineSettings, refine},
     report::report,
     result::{SearchEnd, Survey},
     search::{PlanSearch, initial_walls},
@@ -69,6 +71,10 @@ const ROUNDS: [Round; 3] = [
     Round { sigma_m: 0.006, gate_m: 0.012, max_lines: 30 },
     Round { sigma_m: FINAL_SIGMA_M, gate_m: 0.012, max_lines: 30 },
 ];
+/// Maximum number of restarts from the long walls.
+const MAX_RESTARTS: usize = 2;
+/// Length below which a wall is dropped by a restart, metres.
+const SHORT_M: f64 = 0.3;
 /// Standard deviation of ranges in the final score, metres.
 pub(crate) const FINAL_SIGMA_M: f64 = 0.004;
 /// Maximum number of rounds.
@@ -103,7 +109,7 @@ pub fn survey(
     let end = search.end();
     search.report_progress(SurveyStage::Alternatives);
     let assessment = search.settle();
-    Ok(report(sweeps, &search.posed, assessment, &search.covariance, &workspace, (end, options)))
+    Ok(report(sweeps, &search.posed, &assessment, &search.covariance, &workspace, (end, options)))
 }
 
 /// Score of given walls (pairs of ends, metres) and poses, nats, as that of a [`Survey`].
@@ -205,8 +211,43 @@ impl<'a> SurveySearch<'a> {
         search
     }
 
+    /// Runs the rounds; where arcs remain unexplained, begins again from the long walls alone.
     fn run(&mut self) {
-        for number in 0..MAX_ROUNDS {
+        self.rounds(0);
+        for _ in 0..MAX_RESTARTS {
+            if self.workspace.is_over() || self.left().is_empty() && !self.has_short_walls() {
+                break;
+            }
+            let before = (self.posed.clone(), self.covariance.clone(), self.score);
+            self.drop_short_walls();
+            self.rounds(1);
+            if self.score < before.2 {
+                (self.posed, self.covariance, self.score) = before;
+                break;
+            }
+        }
+    }
+
+    /// Returns `true` with walls that are too short to be trusted.
+    fn has_short_walls(&self) -> bool {
+        let walls = self.posed.plan.segments(&self.posed.walls);
+        walls.iter().any(|wall| wall.a.distance(wall.b) < SHORT_M)
+    }
+
+    /// Removes short walls. Their directions, mostly those of chance alignments, go with them.
+    fn drop_short_walls(&mut self) {
+        let PosedPlan { plan, walls, .. } = &mut self.posed;
+        for run in plan.runs(walls) {
+            let wall = plan.segment(&run);
+            if wall.a.distance(wall.b) < SHORT_M {
+                (run.first..=run.last).for_each(|at| walls.set(plan.piece(run.line, at), false));
+            }
+        }
+    }
+
+    /// Runs rounds from a number on, until no arc is left or a round gains nothing.
+    fn rounds(&mut self, first: usize) {
+        for number in first..MAX_ROUNDS {
             let round = &ROUNDS[number.min(ROUNDS.len() - 1)];
             self.report_progress(SurveyStage::Walls { round: number + 1 });
             let before = self.score.filter(|_| number >= ROUNDS.len());
@@ -301,8 +342,10 @@ impl<'a> SurveySearch<'a> {
         let last = &ROUNDS[ROUNDS.len() - 1];
         for is_last in [false, false, true] {
             let judge = Judge::new(self.workspace, &self.posed.poses, last.sigma_m);
-            let known = self.covariance.take();
-            self.covariance = polish(&mut self.posed, &judge, known.clone()).or(known);
+            let poses = polish(&mut self.posed, &judge);
+            if let (Some(known), Some(poses)) = (self.covariance.take(), poses) {
+                self.covariance = Some(known.with_poses(poses));
+            }
             let judge = Judge::new(self.workspace, &self.posed.poses, last.sigma_m);
             let mut assessment = assess(&self.posed, &judge);
             match assessment.better.take().filter(|_| !is_last) {

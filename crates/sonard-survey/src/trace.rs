@@ -38,8 +38,8 @@ impl ExplainedArc<'_> {
     }
 }
 
-/// Explanation of an arc by the predictions of its sweep: at least `share` of its beams agree within
-/// `gate_m`.
+/// Explanation of an arc by the predictions of its sweep: at least `share` of its beams agree
+/// within `gate_m`.
 pub(crate) fn explain<'a>(
     arc: &'a Arc,
     readings: &Readings,

@@ -78,7 +78,7 @@ fn status_length_m(wall: &SurveyedWall, status: PieceStatus) -> f64 {
             let [from, to] = [piece.from_m, piece.to_m];
             (to[0] - from[0]).hypot(to[1] - from[1])
         })
-        .sum()
+        .fold(0.0, |sum, length_m| sum + length_m)
 }
 
 const WALL_HEAD: [&str; 7] =

@@ -52,7 +52,7 @@ struct Trial {
     lead_nats: f64,
     /// Length of walls reported as observed that are none, metres.
     wrong_observed_m: f64,
-    /// Whether an alternative is the true room.
+    /// An alternative is the true room.
     is_listed: bool,
     end: SearchEnd,
     scenes: usize,

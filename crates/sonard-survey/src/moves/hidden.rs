@@ -16,7 +16,13 @@ const MAX_HIDING: usize = 2;
 const BEFORE_FOOT_M: f64 = 0.03;
 
 /// Piece of a run that hides a foot.
-type Hiding = (Run, usize);
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct HidingPiece {
+    line: usize,
+    first: usize,
+    at: usize,
+    last: usize,
+}
 
 /// Proposes walls at feet, together with the removal of the walls before them.
 pub(super) fn uncover(
@@ -27,7 +33,7 @@ pub(super) fn uncover(
 ) -> Vec<PlanMove> {
     let mut found = Vec::new();
     for line in 0..plan.lines.len() {
-        let mut covered: BTreeSet<(usize, Vec<(usize, usize, usize, usize)>)> = BTreeSet::new();
+        let mut covered: BTreeSet<(usize, Vec<HidingPiece>)> = BTreeSet::new();
         for foot in &plan.lines[line].feet {
             let at = plan.piece_at(line, foot.along_m);
             if !plan.is_inner(line, at) {
@@ -35,8 +41,7 @@ pub(super) fn uncover(
             }
             let hiding = hiding(plan, runs, line, foot, poses);
             if hiding.len() <= MAX_HIDING && !(hiding.is_empty() && plan.is_wall(walls, line, at)) {
-                let key = |&(run, at): &Hiding| (run.line, run.first, at, run.last);
-                covered.insert((at, hiding.iter().map(key).collect()));
+                covered.insert((at, hiding));
             }
         }
         let feet: BTreeSet<usize> = covered.iter().map(|of| of.0).collect();
@@ -54,13 +59,15 @@ fn hiding(
     line: usize,
     foot: &Foot,
     poses: &[Pose],
-) -> Vec<Hiding> {
+) -> Vec<HidingPiece> {
     let from = poses[foot.sweep].position();
     let to = plan.lines[line].at(foot.along_m);
     let before = from + (to - from) * (1.0 - BEFORE_FOOT_M / foot.range_m.max(0.05));
     let others = runs.iter().filter(|run| run.line != line);
-    let pieces = others.flat_map(|run| (run.first..=run.last).map(move |at| (*run, at)));
-    pieces.filter(|(run, at)| crosses([from, before], plan.ends_of(run.line, *at))).collect()
+    let pieces = others.flat_map(|&Run { line, first, last }| {
+        (first..=last).map(move |at| HidingPiece { line, first, at, last })
+    });
+    pieces.filter(|of| crosses([from, before], plan.ends_of(of.line, of.at))).collect()
 }
 
 /// Returns `true` if the inside of the first segment meets the second one.
@@ -82,7 +89,7 @@ fn variants(
     plan: &LineArrangement,
     walls: &PieceSet,
     (line, at): (usize, usize),
-    hiding: &[(usize, usize, usize, usize)],
+    hiding: &[HidingPiece],
     feet: &BTreeSet<usize>,
 ) -> Vec<PlanMove> {
     let on = |at: usize| (plan.piece(line, at), true);
@@ -94,13 +101,13 @@ fn variants(
     let mut found = Vec::new();
     for half in 0..3 {
         let mut change = vec![on(at)];
-        for &(other, first, hidden, last) in hiding {
+        for of in hiding {
             let removed = match half {
-                0 => hidden..=hidden,
-                1 => hidden..=last,
-                _ => first..=hidden,
+                0 => of.at..=of.at,
+                1 => of.at..=of.last,
+                _ => of.first..=of.at,
             };
-            change.extend(removed.map(|of| (plan.piece(other, of), false)));
+            change.extend(removed.map(|at| (plan.piece(of.line, at), false)));
         }
         let with = |more: &mut dyn Iterator<Item = usize>| {
             change.iter().copied().chain(more.map(on)).collect::<PlanMove>()

@@ -13,8 +13,8 @@ use crate::{
     search::{PlanSearch, initial_walls},
 };
 
-/// Every perpendicular and every square corner in reach has an arc at its exact range, a wall at its
-/// distance and a corner at its own.
+/// Every wall has an arc at the distance of its perpendicular, and the farthest corner has one at
+/// its own distance.
 #[test]
 fn arcs_are_at_distances_of_walls_and_corners() {
     let (corners, poses) = (rectangle(), stops());

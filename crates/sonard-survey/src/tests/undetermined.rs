@@ -2,8 +2,7 @@
 
 use super::*;
 use crate::{
-    alternatives::assess, judge::Judge, progress::NoObserver, refine::PosedPlan,
-    result::PieceStatus,
+    alternatives::assess, judge::Judge, posed::PosedPlan, progress::NoObserver, result::PieceStatus,
 };
 
 /// A wall behind the walls of a closed room can't be observed, and neither can a wall across the

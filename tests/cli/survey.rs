@@ -1,0 +1,149 @@
+//! Survey of an unknown room, through the whole program.
+
+use std::{fs, path::Path};
+
+use serde_json::Value;
+
+use crate::common::{run, stderr};
+
+/// Inner sides of the room, metres.
+const SIDES_M: [f64; 2] = [2.8, 2.3];
+/// Stops: x, y in metres and heading in degrees.
+const STOPS: [[f64; 3]; 4] =
+    [[0.7, 0.6, 20.0], [1.2, 0.9, 65.0], [1.9, 1.3, 100.0], [1.4, 1.6, 190.0]];
+
+fn succeeds(arguments: &[&str]) -> String {
+    let output = run(arguments);
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {}", stderr(&output));
+    String::from_utf8(output.stdout).expect("text")
+}
+
+fn path(folder: &Path, name: &str) -> String {
+    folder.join(name).to_str().expect("a plain path").to_owned()
+}
+
+/// Logs of sweeps with a millimetre of noise, whose poses drift by centimetres and degrees.
+fn sweeps(folder: &Path) -> Vec<String> {
+    let [w, d] = SIDES_M;
+    let room = serde_json::json!({
+        "name": "room", "materials": {"wall": {"reflectance": 0.97}},
+        "walls": [{"id": "wall", "polyline": [[0, 0], [w, 0], [w, d], [0, d]], "closed": true, "material": "wall"}],
+    });
+    let scene = path(folder, "truth.json");
+    fs::write(&scene, room.to_string()).expect("written");
+    let log = |(at, [x, y, heading]): (usize, &[f64; 3])| {
+        let log = path(folder, &format!("{at}.jsonl"));
+        let pose = format!("{x},{y},{heading}");
+        let simulate = ["simulate", "--scene", &scene, "--pose", &pose, "-o", &log];
+        succeeds(&[&simulate[..], &["--jitter-us", "6", "--max-range", "4"]].concat());
+        drift(&log, at as f64);
+        log
+    };
+    STOPS.iter().enumerate().map(log).collect()
+}
+
+/// Changes the pose in a log by an error that grows along the course.
+fn drift(log: &str, by: f64) {
+    let text = fs::read_to_string(log).expect("a log");
+    let changed = text.lines().map(|line| {
+        let mut record: Value = serde_json::from_str(line).expect("JSON");
+        if let Some(pose) = record.get_mut("pose").filter(|pose| pose.is_object()) {
+            for (name, error) in [("x_m", 0.012), ("y_m", -0.009), ("heading_deg", 1.1)] {
+                let value = pose[name].as_f64().expect("a number");
+                pose[name] = (value + by * error).into();
+            }
+        }
+        record.to_string() + "\n"
+    });
+    fs::write(log, changed.collect::<String>()).expect("written");
+}
+
+fn distance_m(a: &Value, b: &Value) -> f64 {
+    let by = |at: usize| a[at].as_f64().expect("metres") - b[at].as_f64().expect("metres");
+    by(0).hypot(by(1))
+}
+
+#[test]
+fn survey_reconstructs_room_and_course() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let logs = sweeps(folder.path());
+    let out = path(folder.path(), "out");
+    let mut arguments = vec!["survey", "--odometry", "0.05,5", "--out", &out, "--max-range", "4"];
+    arguments.extend(logs.iter().map(String::as_str));
+    let printed = succeeds(&arguments);
+    assert!(printed.starts_with("4 walls from 4 sweeps"), "{printed}");
+    let read = |name: &str| fs::read_to_string(format!("{out}/{name}")).expect(name);
+    let survey: Value = serde_json::from_str(&read("survey.json")).expect("JSON");
+    assert_eq!(survey["end"], "complete", "{survey}");
+
+    // Lengths are independent of the frame, which is the drifting odometry's.
+    let walls = survey["walls"].as_array().expect("walls");
+    let mut lengths_m: Vec<f64> =
+        walls.iter().map(|wall| distance_m(&wall["from"]["at_m"], &wall["to"]["at_m"])).collect();
+    lengths_m.sort_by(f64::total_cmp);
+    let [w, d] = SIDES_M;
+    for (found_m, expected_m) in lengths_m.iter().zip([d, d, w, w]) {
+        assert!((found_m - expected_m).abs() < 0.001, "{lengths_m:?}");
+    }
+    let poses: Vec<Value> = survey["poses"].as_array().expect("poses").clone();
+    for (at, found) in poses.iter().enumerate() {
+        for (other, to) in poses.iter().enumerate().skip(at + 1) {
+            let [a, b] = [&found["pose"], &to["pose"]];
+            let by = |name: &str| b[name].as_f64().expect(name) - a[name].as_f64().expect(name);
+            let expected = [0, 1, 2].map(|of: usize| STOPS[other][of] - STOPS[at][of]);
+            let off_m = by("x_m").hypot(by("y_m")) - expected[0].hypot(expected[1]);
+            let off_deg = (by("heading_deg") - expected[2] + 180.0).rem_euclid(360.0) - 180.0;
+            assert!(off_m.abs() < 0.001 && off_deg.abs() < 0.1, "{off_m} {off_deg} {found} {to}");
+        }
+    }
+    assert_eq!(read("poses.csv").lines().count(), 1 + STOPS.len());
+    assert!(read("report.md").contains("![Floor plan](plan.png)"));
+    assert!(read("plan.svg").contains("observed wall"));
+
+    // The scene is one for other verbs, in which readings agree and are found again.
+    let scene = path(Path::new(&out), "scene.json");
+    succeeds(&["scene", "check", &scene]);
+    let pose = &poses[2]["pose"];
+    let pose = ["x_m", "y_m", "heading_deg"].map(|name| pose[name].to_string()).join(",");
+    let compare = ["compare", &logs[2], "--json", "--scene", &scene, "--pose", &pose];
+    let compared: Value =
+        serde_json::from_str(succeeds(&compare).lines().next().expect("a line")).expect("JSON");
+    let [agree, both] = ["agree", "both_echo"].map(|name| compared[name].as_f64().expect(name));
+    assert!(agree / both > 0.97, "{compared}");
+    let located = succeeds(&["locate", &logs[2], "--json", "--scene", &scene]);
+    let is_near = |line: &str| {
+        let found: Value = serde_json::from_str(line).expect("JSON");
+        ["x_m", "y_m"].iter().all(|name| {
+            let at = |value: &Value| value[*name].as_f64().expect("metres");
+            (at(&found) - at(&poses[2]["pose"])).abs() < 0.01
+        })
+    };
+    assert!(located.lines().any(is_near), "{located}");
+
+    // Results are kept without --force.
+    assert_eq!(run(&arguments).status.code(), Some(2));
+}
+
+#[test]
+fn survey_states_what_is_missing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let logs = sweeps(folder.path());
+    let out = path(folder.path(), "out");
+    let rejected = |arguments: &[&str], reason: &str| {
+        let output = run(&[&["survey", "--out", &out], arguments].concat());
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}");
+        assert!(stderr(&output).contains(reason), "{arguments:?}: {}", stderr(&output));
+        assert!(!Path::new(&out).exists());
+    };
+    rejected(&[&logs[0]], "a survey needs at least 2");
+    rejected(&[&logs[0], &logs[1], "--odometry", "5"], "such as 0.05,5");
+    rejected(&[&logs[0], &logs[1], "--odometry", "0.1,2", "--no-odometry"], "cannot be used with");
+    // Nothing is nearer than the range that still counts.
+    rejected(&[&logs[0], &logs[1], "--max-range", "0.3"], "no arc of equal ranges");
+    // A search that ends early leaves its best plan and an exit code.
+    let output = run(&["survey", &logs[0], &logs[1], "--out", &out, "--max-scenes", "100"]);
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(printed.contains("the budget is spent before the search ended"), "{printed}");
+    assert!(Path::new(&out).join("scene.json").exists());
+}
