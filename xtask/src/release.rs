@@ -124,7 +124,7 @@ impl Release {
             return Ok(built);
         }
         add_target(target)?;
-        let tools = Tools::install(&self.target)?;
+        let tools = Tools::for_building(&self.target)?;
         let zig_target = match target.ends_with("-gnu") {
             true => format!("{target}.{GLIBC}"),
             false => target.to_owned(),

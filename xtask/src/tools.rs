@@ -8,28 +8,41 @@ use std::{
 
 use crate::{Failure, command::run};
 
-/// Packages of PyPI.
-const PACKAGES: [&str; 4] =
-    ["cargo-zigbuild==0.24.1", "maturin==1.16.0", "wheel==0.48.0", "ziglang==0.17.1"];
+/// Packages of PyPI that build programs and libraries.
+const BUILD: [&str; 3] = ["cargo-zigbuild==0.24.1", "maturin==1.16.0", "ziglang==0.17.1"];
+/// Packages of PyPI that pack wheels.
+const PACK: [&str; 1] = ["wheel==0.48.0"];
 
 /// Folder of installed tools.
 #[derive(Debug)]
 pub(crate) struct Tools(PathBuf);
 
 impl Tools {
-    /// Installs the tools into a virtual environment below `target`, unless they are there.
+    /// Installs what builds, unless it is there.
     ///
     /// # Errors
     /// No Python, or a package that can't be installed.
-    pub(crate) fn install(target: &Path) -> Result<Self, Failure> {
-        let environment = target.join("tools/dist");
+    pub(crate) fn for_building(target: &Path) -> Result<Self, Failure> {
+        Self::install(&target.join("tools/dist-build"), &BUILD)
+    }
+
+    /// Installs what packs wheels, unless it is there.
+    ///
+    /// # Errors
+    /// No Python, or a package that can't be installed.
+    pub(crate) fn for_packing(target: &Path) -> Result<Self, Failure> {
+        Self::install(&target.join("tools/dist-pack"), &PACK)
+    }
+
+    /// Makes a virtual environment with packages.
+    fn install(environment: &Path, packages: &[&str]) -> Result<Self, Failure> {
         // Written last, so that an incomplete environment is made again.
-        let (list, wanted) = (environment.join("packages"), PACKAGES.join("\n"));
+        let (list, wanted) = (environment.join("packages"), packages.join("\n"));
         if fs::read_to_string(&list).unwrap_or_default() != wanted {
-            run(Command::new("python3").args(["-m", "venv", "--clear"]).arg(&environment))?;
+            run(Command::new("python3").args(["-m", "venv", "--clear"]).arg(environment))?;
             run(Command::new(environment.join("bin/pip"))
                 .args(["install", "--quiet", "--disable-pip-version-check"])
-                .args(PACKAGES))?;
+                .args(packages))?;
             fs::write(list, wanted)?;
         }
         Ok(Self(environment.join("bin")))

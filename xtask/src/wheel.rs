@@ -18,22 +18,23 @@ use crate::{
 /// # Errors
 /// A failed build.
 pub(crate) fn build_all(release: &Release) -> Result<(), Failure> {
-    let tools = Tools::install(&release.target)?;
+    let packing = Tools::for_packing(&release.target)?;
     for target in &release.targets {
         let program = release.build_program(&target.replace("-gnu", "-musl"))?;
         let work = release.work_folder("wheel")?;
         let wheel = match &release.wheel {
             Some(wheel) => wheel.clone(),
-            None => build(release, &tools, target, &work)?,
+            None => build(release, target, &work)?,
         };
-        add_program(release, &tools, &wheel, &program)?;
+        add_program(release, &packing, &wheel, &program)?;
     }
     Ok(())
 }
 
 /// Builds the wheel of the Python package into `work`.
-fn build(release: &Release, tools: &Tools, target: &str, work: &Path) -> Result<PathBuf, Failure> {
+fn build(release: &Release, target: &str, work: &Path) -> Result<PathBuf, Failure> {
     add_target(target)?;
+    let tools = Tools::for_building(&release.target)?;
     let mut build = Command::new(tools.program("maturin"));
     build.args(["build", "--release", "--locked", "--quiet", "--zig", "--target", target]);
     build.args(["--compatibility", compatibility(target)]);
