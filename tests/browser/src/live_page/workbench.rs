@@ -346,7 +346,7 @@ fn array_is_moved() {
     // Readings have their causes, and the lobes of their rangers; there is nothing to compare.
     until_has(&browser, "#legend", "main lobe up to the reading");
     until_has(&browser, "#legend", "direct echo (");
-    assert_eq!(browser.eval("document.getElementById('residuals').hidden"), true);
+    browser.until("document.getElementById('residuals').hidden");
     assert!(!browser.text("#health").contains("Serial link"), "{}", browser.text("#health"));
     assert!(browser.text("#conditions").contains("8 rangers"), "{}", browser.text("#conditions"));
     browser.click("#change");

@@ -300,6 +300,8 @@ async function readNewest() {
   const [record, status] = await requests.catch(() => []);
   if (!record?.start) return;
   const streamed = live;
+  session ??= record.session;
+  if (streamed) streamed.session ??= session;
   // A scan that started while the log was read is newer than the log's.
   if (streamed && streamed.id !== newest && Date.parse(streamed.start.time) > Date.parse(record.start.time)) return;
   session = record.session ?? session;
