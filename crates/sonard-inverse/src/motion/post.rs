@@ -45,8 +45,8 @@ impl PostContact {
         let Some(cylinder) = scene.cylinders.get(self.cylinder as usize) else { return 0.0 };
         let (_, growth) = motion.of_cylinder(self.cylinder).unwrap_or_default();
         let interactions = &path.interactions;
-        let out: Vec<Interaction> = interactions.iter().take(self.at).rev().cloned().collect();
-        let back: Vec<Interaction> = interactions.iter().skip(self.at + 1).cloned().collect();
+        let out: Vec<Interaction> = interactions.iter().take(self.at).rev().copied().collect();
+        let back: Vec<Interaction> = interactions.iter().skip(self.at + 1).copied().collect();
         let legs =
             [(out, 0), (back, 1)].map(|(met, end)| self.leg(met, ends[end], end, scene, motion));
         let [Some(u), Some(v)] = legs else { return 0.0 };

@@ -12,6 +12,7 @@ mod tests;
 
 use std::f64::consts::PI;
 
+use smallvec::SmallVec;
 use thiserror::Error;
 
 pub use boxes::BoxRoom;
@@ -126,13 +127,16 @@ pub fn image_sources(
     Ok(found)
 }
 
-/// One image of the source, seen from one receiver.
+/// Image of the source, visible from a receiver.
 struct ImageSource {
     position_m: [f64; 3],
     distance_m: f64,
     reflectance: f64,
-    surfaces: Vec<u32>,
+    surfaces: SmallVec<[u32; INLINE]>,
 }
+
+/// Number of surfaces of a path that need no allocation.
+const INLINE: usize = 20;
 
 impl ImageSource {
     /// Combines a path in the plan with an image by floor and ceiling.
@@ -142,7 +146,7 @@ impl ImageSource {
         let length_m = path.run.length();
         let walls = path.walls.iter().map(|&(wall, at_m)| (at_m / length_m, wall));
         let levels = image.shares(climb_m).zip(image.surfaces.iter().copied());
-        let mut surfaces: Vec<(f64, u32)> = walls.chain(levels).collect();
+        let mut surfaces: SmallVec<[(f64, u32); INLINE]> = walls.chain(levels).collect();
         surfaces.sort_by(|a, b| a.0.total_cmp(&b.0));
         Self {
             position_m: [position.x, position.y, image.z_m],
@@ -196,19 +200,19 @@ impl ImageSources {
 
     /// Moves the images of one more receiver into the lists, nearest first.
     fn add(&mut self, receiver: u32, images: &mut Vec<ImageSource>) {
-        images.sort_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
-        for image in images.drain(..) {
-            self.push(receiver, image.position_m, image.distance_m, image.reflectance);
-            self.surfaces.extend(image.surfaces);
+        // Distances are positive, so their bits sort like the numbers; images are large to move.
+        let distances = images.iter().map(|image| image.distance_m.to_bits());
+        let mut order: Vec<(u64, usize)> = distances.zip(0..).collect();
+        order.sort_unstable();
+        for image in order.into_iter().filter_map(|(_, at)| images.get(at)) {
+            self.receivers.push(receiver);
+            self.positions_m.push(image.position_m);
+            self.distances_m.push(image.distance_m);
+            self.reflectances.push(image.reflectance);
+            self.surfaces.extend_from_slice(&image.surfaces);
             self.ends.push(self.surfaces.len());
         }
-    }
-
-    fn push(&mut self, receiver: u32, position_m: [f64; 3], distance_m: f64, reflectance: f64) {
-        self.receivers.push(receiver);
-        self.positions_m.push(position_m);
-        self.distances_m.push(distance_m);
-        self.reflectances.push(reflectance);
+        images.clear();
     }
 }
 

@@ -1,5 +1,7 @@
 //! Closed form for boxes: the lattice of Allen and Berkley.
 
+use smallvec::SmallVec;
+
 use super::{ImageSource, ImageSourceError, ImageSources};
 
 /// A box with a corner at the origin.
@@ -17,6 +19,40 @@ struct AxisImage {
     /// Number of the cell that contains the image; its magnitude is the number of reflections.
     cell: i32,
     reflectance: f64,
+}
+
+/// Planes of a lattice that are still to be crossed along one axis, the farthest from the receiver
+/// first.
+struct CrossedPlanes {
+    /// Surfaces at even and at odd planes.
+    surfaces: [usize; 2],
+    /// Cell behind the next plane, seen from the receiver; 0 when none is left.
+    cell: i32,
+    /// Share of the path from the receiver at plane 0, and from plane to plane.
+    from: f64,
+    per_cell: f64,
+}
+
+impl CrossedPlanes {
+    /// Number of the next plane.
+    const fn plane(&self) -> i32 {
+        if self.cell > 0 { self.cell } else { self.cell + 1 }
+    }
+
+    /// Share of the path from the receiver to the next plane; negative if none is left.
+    fn share(&self) -> f64 {
+        if self.cell == 0 { -1.0 } else { self.from + f64::from(self.plane()) * self.per_cell }
+    }
+
+    /// Crosses the next plane, and returns its surface.
+    fn take(&mut self) -> Option<u32> {
+        if self.cell == 0 {
+            return None;
+        }
+        let surface = self.surfaces[usize::from(self.plane() % 2 != 0)];
+        self.cell -= self.cell.signum();
+        Some(surface as u32)
+    }
 }
 
 impl BoxRoom {
@@ -115,6 +151,19 @@ impl BoxRoom {
         (-order..=order).map(image).collect()
     }
 
+    /// Planes across an axis between the receiver, in cell 0, and an image.
+    fn planes(&self, axis: usize, along: [&AxisImage; 3], receiver_m: [f64; 3]) -> CrossedPlanes {
+        let AxisImage { at_m, cell, .. } = *along[axis];
+        let side_m = self.size_m.get(axis).copied().unwrap_or_default();
+        let run_m = at_m - receiver_m[axis];
+        CrossedPlanes {
+            surfaces: Self::surfaces(axis),
+            cell,
+            per_cell: side_m / run_m,
+            from: -receiver_m[axis] / run_m,
+        }
+    }
+
     /// Image at a place along each axis; `None` at the receiver itself.
     fn image(&self, along: [&AxisImage; 3], receiver_m: [f64; 3]) -> Option<ImageSource> {
         let is_planar = self.size_m.len() == 2;
@@ -125,25 +174,18 @@ impl BoxRoom {
         if distance_m == 0.0 {
             return None;
         }
-        let mut crossed: Vec<(f64, u32)> = Vec::new();
-        for (axis, image) in along.iter().enumerate().filter(|(_, image)| image.cell != 0) {
-            let (side_m, sign) = (self.size_m[axis], image.cell.signum());
-            let surfaces = Self::surfaces(axis);
-            // Planes between the receiver, in cell 0, and the image.
-            for number in 0..image.cell.abs() {
-                let plane = if sign > 0 { number + 1 } else { -number };
-                let share = (f64::from(plane) * side_m - receiver_m[axis])
-                    / (image.at_m - receiver_m[axis]);
-                let is_upper = plane % 2 != 0;
-                crossed.push((share, surfaces[usize::from(is_upper)] as u32));
-            }
+        let mut planes = [0, 1, 2].map(|axis| self.planes(axis, along, receiver_m));
+        let mut surfaces = SmallVec::new();
+        // From the source, which is the farthest from the receiver.
+        while let Some(next) = planes.iter_mut().max_by(|a, b| a.share().total_cmp(&b.share())) {
+            let Some(surface) = next.take() else { break };
+            surfaces.push(surface);
         }
-        crossed.sort_by(|a, b| b.0.total_cmp(&a.0));
         Some(ImageSource {
             position_m,
             distance_m,
             reflectance: along.iter().map(|image| image.reflectance).product(),
-            surfaces: crossed.into_iter().map(|(_, surface)| surface).collect(),
+            surfaces,
         })
     }
 }

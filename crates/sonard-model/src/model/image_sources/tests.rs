@@ -35,7 +35,10 @@ fn box_corners([x, y]: [f64; 2]) -> [DVec2; 4] {
     [DVec2::ZERO, DVec2::new(x, 0.0), DVec2::new(x, y), DVec2::new(0.0, y)]
 }
 
-fn rows(images: &ImageSources) -> Vec<(u32, [f64; 3], f64, f64, Vec<u32>)> {
+/// Receiver, position, distance, reflectance and surfaces of an image.
+type Row = (u32, [f64; 3], f64, f64, Vec<u32>);
+
+fn rows(images: &ImageSources) -> Vec<Row> {
     let row = |at: usize| {
         let surfaces = images.surfaces(at).to_vec();
         let (position, distance) = (images.positions_m[at], images.distances_m[at]);
@@ -50,7 +53,7 @@ fn assert_same(one: &ImageSources, other: &ImageSources) {
     assert_eq!(one.len(), other.len());
     let mut rest = rows(other);
     for image in rows(one) {
-        let is_same = |row: &(u32, [f64; 3], f64, f64, Vec<u32>)| {
+        let is_same = |row: &Row| {
             let apart = row.1.iter().zip(image.1).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             row.0 == image.0
                 && apart < SAME_M
