@@ -24,6 +24,7 @@
 #   PROMTOOL=0           without promtool (Debian package prometheus)
 #   FAKETIME=0           without the clock that is set (libfaketime)
 #   PLATFORMS=0          without Clippy for macOS and Windows
+#   DIST=0               without the installation of a release that is packed around the tests' program
 #   BOOT=0               without units under a booted systemd (systemd/boot-test.sh)
 #   PACKAGE=1            with the Debian package around the tests' program: build, installation, upgrade, removal;
 #                        PACKAGE=release with the release build, PACKAGE=all also for a Raspberry Pi
@@ -224,6 +225,17 @@ check_package() {
   fi
 }
 
+check_dist() {
+  if [ "${DIST:-1}" = 0 ]; then
+    step "installation of a release: LEFT OUT, because DIST=0"
+    return
+  fi
+  step "installation of a release, around the tests' program"
+  local wheels=()
+  if [ "${PYTHON:-1}" != 0 ]; then wheels=(python/target/wheels/*.whl); fi
+  gently tests/dist.sh "${CARGO_TARGET_DIR:-target}/debug/sonard" "${wheels[@]}"
+}
+
 play_emulator() {
   if [ "${FIRMWARE:-1}" = 0 ]; then return; fi
   step "sonard on the emulated board"
@@ -389,9 +401,11 @@ all)
   check_documentation
   check_examples
   join "apart from the workspace"
+  lane "release" check_dist
   test_python
   join "programs of others"
   join "units and package"
+  join "release"
   test_page
   step "tests"
   run_tests || finish $?

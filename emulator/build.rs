@@ -1,4 +1,4 @@
-//! Generates bindings to libsimavr.
+//! Generates bindings to libsimavr, and states the commit.
 
 use std::error::Error;
 
@@ -10,6 +10,7 @@ io_getirq|raise_irq|irq_register_notify|cycle_timer_register|cycle_timer_cancel)
 fn main() -> Result<(), Box<dyn Error>> {
     use std::{env, path::PathBuf};
 
+    sonard_build::emit(sonard_build::Package { folder: "emulator/", features: &["simavr"] });
     println!("cargo:rerun-if-changed=wrapper.h");
     let simavr = pkg_config::Config::new().atleast_version("1.6").probe("simavr").map_err(|error| {
         format!("libsimavr is missing (apt-get install libsimavr-dev libelf-dev libclang-dev): {error}")

@@ -12,7 +12,7 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 fail() { printf 'packaging/build.sh: %s\n' "$*" >&2; exit 1; }
 target=${CARGO_TARGET_DIR:-target}
-tools=$PWD/$target/tools
+tools=$(realpath --canonicalize-missing "$target")/tools
 
 if [ ! -x "$tools/bin/cargo-deb" ]; then
   # A program that packs files once: building it takes longer than it runs.

@@ -14,7 +14,7 @@ work=$(mktemp -d)
 trap 'rm -rf --one-file-system "$work"' EXIT
 fail() { printf 'tests/dist.sh: %s\n' "$*" >&2; exit 1; }
 rows=$work/rows
-row() { printf '| %-44s | %-34s | %7s | %5s | %-4s |\n' "$@" >>"$rows"; }
+row() { printf '| %s | %s | %s | %s | %s |\n' "$@" >>"$rows"; }
 leave_out() { row "$1" "untested: $2" - - -; }
 scan=(scan --mock --scene simple-room --pose fig9 --out out/fig9)
 machine=$(uname -m)
@@ -31,7 +31,7 @@ pack() {
 # timed COMMAND...: seconds that it takes, into `took`.
 timed() {
   local began=$EPOCHREALTIME
-  "$@" >"$work/said" 2>&1 || fail "$*: $(cat "$work/said")"
+  "$@" >"$work/output" 2>&1 || fail "$*: $(cat "$work/output")"
   took=$(awk "BEGIN { printf \"%.1f\", $EPOCHREALTIME - $began }")
 }
 megabytes() { du --bytes --total "$@" | tail -n 1 | awk '{ printf "%.1f", $1 / 1e6 }'; }
@@ -63,17 +63,17 @@ PATH=\$HOME/.local/bin:\$PATH
 sonard ${scan[*]}
 END
   timed within "$root" setpriv --reuid user --regid user --clear-groups env HOME=/home/user sh /first.sh
-  [ -s "$root/home/user/out/fig9/scan.png" ] || fail "no picture: $(cat "$work/said")"
+  [ -s "$root/home/user/out/fig9/scan.png" ] || fail "no picture: $(cat "$work/output")"
   row "$platform" "install.sh, then the first scan" "$took" "$(megabytes "$archive")" no
   chroot "$root" setpriv --reuid user --regid user --clear-groups env HOME=/home/user \
     sh -c 'rm -r "$HOME/out" && sh /dist/install.sh --uninstall && rmdir "$HOME/.local" 2>/dev/null || true'
   chroot "$root" find /home/user | sort | diff "$work/before" - || fail "uninstalling leaves files"
   # A changed archive is rejected.
   printf x >>"$root/dist/$(basename "$archive")"
-  if chroot "$root" env HOME=/home/user sh /dist/install.sh --from /dist >"$work/said" 2>&1; then
+  if chroot "$root" env HOME=/home/user sh /dist/install.sh --from /dist >"$work/output" 2>&1; then
     fail "a changed archive is installed"
   fi
-  grep -q 'digest' "$work/said" || fail "$(cat "$work/said")"
+  grep -q 'digest' "$work/output" || fail "$(cat "$work/output")"
 }
 
 # A root with nothing but the static program.
@@ -84,7 +84,7 @@ try_static() {
   mkdir -p "$root/dev" "$root/tmp"
   tar --extract --file "$archive" --directory "$root" --strip-components 2 --wildcards '*/bin/sonard'
   timed within "$root" /sonard "${scan[@]}"
-  [ -s "$root/out/fig9/scan.png" ] || fail "no picture: $(cat "$work/said")"
+  [ -s "$root/out/fig9/scan.png" ] || fail "no picture: $(cat "$work/output")"
   row "$platform" "the program alone" "$took" "$(megabytes "$archive")" no
 }
 
@@ -105,7 +105,7 @@ venv/bin/pip install --quiet --disable-pip-version-check --no-index --find-links
 venv/bin/sonard ${scan[*]}
 END
   timed bash "$work/wheel.sh"
-  [ -s "$work/out/fig9/scan.png" ] || fail "no picture: $(cat "$work/said")"
+  [ -s "$work/out/fig9/scan.png" ] || fail "no picture: $(cat "$work/output")"
   (cd "$work" && venv/bin/python -c 'import sonard; sonard.Scene.shipped("simple-room")') || fail "the Python package"
   row "$platform" "pip install sonard, then the first scan" "$took" "$(megabytes "$work"/index/*)" no
   "$work/venv/bin/pip" uninstall --quiet --yes --disable-pip-version-check sonard numpy
@@ -124,7 +124,7 @@ try_aarch64() {
   row "$platform" "scene check, which starts no thread" "$took" "$(megabytes "$archive")" no
 }
 
-# Nothing tells where, by whom and when the artefacts were built.
+# Checks that the archives contain no path or name of this computer.
 look_for_traces() {
   local trace file
   rm -rf "$work/traces"
@@ -157,9 +157,5 @@ fi
 try_wheel
 try_aarch64
 row 'macOS, Windows' 'untested: linted only' - - -
-head_of_table() {
-  printf '| %-44s | %-34s | %7s | %5s | %-4s |\n' platform command seconds MB root
-  printf '| --- | --- | ---: | ---: | --- |\n'
-}
-head_of_table
+printf '| platform | command | seconds | MB | root |\n| --- | --- | ---: | ---: | --- |\n'
 cat "$rows"

@@ -25,12 +25,21 @@ use sonard_model::{
     scene::{Scene, shipped},
 };
 
+/// Text of `--version` after the name.
+const LONG_VERSION: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    "\ncommit ",
+    env!("SONARD_COMMIT"),
+    "\nfeatures ",
+    env!("SONARD_FEATURES")
+);
+
 /// Run the firmware's machine code in an emulated Arduino Uno, with its serial line on a pty.
 ///
 /// The echoes come from the model of the scene. The board identifies itself as emulated, so every
 /// log recorded from it is marked accordingly. Runs until interrupted.
 #[derive(Debug, Parser)]
-#[command(version, after_help = EXAMPLE)]
+#[command(version, long_version = LONG_VERSION, after_help = EXAMPLE)]
 struct Args {
     /// Scene file, or the name of a shipped scene
     #[arg(long, value_name = "SCENE")]

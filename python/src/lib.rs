@@ -52,6 +52,7 @@ mod _sonard {
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
         use pyo3::types::PyModuleMethods as _;
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        module.add("__commit__", env!("SONARD_COMMIT"))?;
         module.add("READING", crate::arrays::reading_dtype(module.py())?)?;
         let array_reading = crate::arrays::array_reading_dtype(module.py())?;
         module.add("ARRAY_READING", array_reading)?;

@@ -69,3 +69,32 @@ impl fmt::Display for Diagnostic {
         f.write_str(&self.message)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use anstream::adapter::strip_str;
+
+    use super::*;
+
+    #[test]
+    fn excerpt_has_the_place_of_the_failure() {
+        let text = "{\n  \"walls\": [1]\n}\n".to_owned();
+        let diagnostic = Diagnostic::new("room.json:2:13: not a wall", "give two points");
+        let place = text.find('1').expect("there");
+        let shown = diagnostic.with_excerpt(text, place..place + 1, "walls[0]".to_owned()).render();
+        let shown = strip_str(&shown).to_string();
+        assert!(shown.starts_with("error: room.json:2:13: not a wall\n"), "{shown}");
+        let lines: Vec<_> = shown.lines().map(str::trim_end).collect();
+        let excerpt = lines.iter().position(|line| line.ends_with("\"walls\": [1]"));
+        let below = lines[excerpt.expect("the line") + 1];
+        assert!(below.ends_with("^ walls[0]"), "{shown}");
+        assert_eq!(lines.last(), Some(&"  help: give two points"), "{shown}");
+    }
+
+    #[test]
+    fn long_advice_is_not_wrapped() {
+        let help = "give --out ".repeat(30);
+        let shown = Diagnostic::new("no folder", &help).render();
+        assert_eq!(strip_str(&shown).to_string(), format!("error: no folder\n  help: {help}"));
+    }
+}

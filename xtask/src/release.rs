@@ -143,7 +143,8 @@ impl Release {
     /// # Errors
     /// A failed build of a program that runs on this computer.
     pub(crate) fn write_package_files(&self) -> Result<PathBuf, Failure> {
-        let folder = self.target.join("package");
+        // Where the assets in Cargo.toml name them.
+        let folder = self.root.join("target/package");
         if folder.exists() {
             fs::remove_dir_all(&folder)?;
         }

@@ -18,9 +18,12 @@ use clap::{Parser, Subcommand};
 
 pub(crate) use failure::{Failure, Outcome};
 
+/// Text of `--version` after the name.
+const LONG_VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "\ncommit ", env!("SONARD_COMMIT"));
+
 /// Repeats the experiments of the papers on simulated rooms
 #[derive(Debug, Parser)]
-#[command(version, about, max_term_width = 100, after_help = EXIT_CODES)]
+#[command(version, long_version = LONG_VERSION, about, max_term_width = 100, after_help = EXIT_CODES)]
 struct Cli {
     #[command(subcommand)]
     verb: Verb,

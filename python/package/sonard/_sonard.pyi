@@ -31,6 +31,7 @@ __all__ = [
     "SensorError",
     "SonardError",
     "TooManyPathsError",
+    "__commit__",
     "__version__",
     "_time_predict_many",
     "calibrate",
@@ -42,6 +43,7 @@ __all__ = [
     "read_log",
 ]
 
+__commit__: str
 __version__: str
 READING: np.dtype[np.void]
 ARRAY_READING: np.dtype[np.void]

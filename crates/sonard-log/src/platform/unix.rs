@@ -93,7 +93,7 @@ pub(crate) fn create_unnamed(_folder: &Path, _mode: u32) -> io::Result<Option<Fi
     Ok(None)
 }
 
-/// Gives an unnamed file a name, which must not exist.
+/// Links an unnamed file under a name, which must not exist.
 pub(crate) fn name_file(file: &File, name: &Path) -> io::Result<()> {
     use rustix::fs::{AtFlags, CWD, linkat};
     let descriptor = format!("{DESCRIPTORS}/{}", file.as_raw_fd());
