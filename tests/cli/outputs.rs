@@ -39,7 +39,7 @@ const fn case(
     Case { output, input, arguments }
 }
 
-const CASES: [Case; 39] = [
+const CASES: [Case; 40] = [
     case("plot --output", ("a.svg", LOG), "plot IN -o IN"),
     case("plot --output", ("a.png", LOG), "plot IN -o IN --force"),
     case("plot --output", ("a.svg", SCENE), "plot LOG --scene IN -o IN"),
@@ -90,6 +90,7 @@ const CASES: [Case; 39] = [
     case("calibrate --out", ("sensor.json", LOG), "calibrate IN --out DIR --force"),
     case("calibrate --out", ("scene.json", SCENE), "calibrate LOG --scene IN --out DIR --force"),
     case("calibrate --out", ("unfinished.jsonl", LOG), "calibrate IN --out DIR --force"),
+    case("survey --out", ("survey.json", LOG), "survey IN --out DIR --force"),
     case("predict --output", ("a.jsonl", LOG), "predict IN -o IN --force"),
     case("predict --output", ("a.json", SCENE), "predict LOG --scene IN -o IN --force"),
     case("log annotate --output", ("a.jsonl", LOG), "log annotate IN -o IN --force"),

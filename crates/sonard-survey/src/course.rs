@@ -4,13 +4,8 @@ use serde::{Deserialize, Serialize};
 use sonard_inverse::{FitSweep, World};
 
 use crate::{
-    error::SurveyError,
-    feature::VirtualFeature,
-    normal::pose_column,
-    progress::NoObserver,
-    result::SurveyedPose,
-    slam::virtual_map,
-    survey::{SurveyOptions, workspace},
+    error::SurveyError, feature::VirtualFeature, normal::pose_column, options::SurveyOptions,
+    progress::NoObserver, result::SurveyedPose, slam::virtual_map, survey::workspace,
 };
 
 /// Poses and virtual features of a course.

@@ -7,7 +7,7 @@ use thiserror::Error;
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SurveyError {
     /// Fewer sweeps than needed.
-    #[error("{0} sweeps: a survey needs at least 2, from different places")]
+    #[error("too few sweeps ({0}): a survey needs at least 2, from different places")]
     TooFewSweeps(usize),
     /// No arc in a sweep, so that its pose is unknown.
     #[error("scan {0} has no arc of equal ranges, by which it could be located")]

@@ -27,6 +27,7 @@ mod line;
 mod moves;
 mod normal;
 mod odometry;
+mod options;
 mod polish;
 mod posed;
 mod progress;
@@ -47,9 +48,10 @@ pub use course::{CourseMap, map_course};
 pub use error::SurveyError;
 pub use feature::VirtualFeature;
 pub use odometry::OdometrySigma;
+pub use options::SurveyOptions;
 pub use progress::{NoObserver, SurveyObserver, SurveyProgress, SurveyStage};
 pub use result::{
     AlternativePlan, PieceStatus, ReadingCause, SearchEnd, Survey, SurveyedEnd, SurveyedPose,
     SurveyedWall, UnexplainedArc, WallPiece,
 };
-pub use survey::{SurveyOptions, score_plan, survey};
+pub use survey::{score_plan, survey};

@@ -3,6 +3,7 @@
 mod block;
 mod corner;
 mod hidden;
+mod plan_move;
 
 use std::collections::BTreeSet;
 
@@ -12,21 +13,18 @@ use block::blocks;
 use corner::corners_at_points;
 pub(crate) use hidden::crosses;
 use hidden::uncover;
+pub(crate) use plan_move::PlanMove;
+use plan_move::to_next_wall;
 
 use crate::{
     arrangement::{LineArrangement, PieceSet, Run},
     faces::cells,
 };
 
-/// Pieces that become walls or stop being walls.
-pub(crate) type PlanMove = Vec<(usize, bool)>;
-
 /// Maximum number of pieces by which an end is retracted, extended, or extended to a corner.
 const MAX_RETRACTED: usize = 14;
 const MAX_EXTENDED: usize = 8;
 const MAX_TO_CORNER: usize = 10;
-/// Maximum number of pieces from a point to the next wall.
-const MAX_TO_WALL: usize = 12;
 
 /// Proposes changes of the walls of an arrangement.
 pub(crate) struct MoveFinder<'a> {
@@ -223,22 +221,4 @@ fn extended_to(run: &Run, cut: usize) -> Option<std::ops::Range<usize>> {
         0..0
     };
     (way.len() <= MAX_TO_CORNER).then_some(way)
-}
-
-/// Pieces from one up or down the line to the next crossing wall; `None` if none is near.
-fn to_next_wall(
-    plan: &LineArrangement,
-    walls: &PieceSet,
-    (line, from): (usize, usize),
-    is_up: bool,
-) -> Option<Vec<usize>> {
-    let (mut at, mut way) = (from, Vec::new());
-    while plan.is_inner(line, at) && way.len() < MAX_TO_WALL {
-        way.push(at);
-        if plan.is_met(walls, line, if is_up { at + 1 } else { at }) {
-            return Some(way);
-        }
-        at = if is_up { at + 1 } else { at.checked_sub(1)? };
-    }
-    None
 }

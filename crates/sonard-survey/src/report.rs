@@ -8,13 +8,13 @@ use crate::{
     arrangement::LineArrangement,
     covariance::PlanCovariance,
     judge::{Judge, outcome_of},
+    options::{EXPLAINED_M, FINAL_SIGMA_M, SurveyOptions},
     posed::PosedPlan,
     readings::{Beam, Outcome},
     result::{
         AlternativePlan, ReadingCause, SearchEnd, Survey, SurveyedEnd, SurveyedPose, SurveyedWall,
         UnexplainedArc,
     },
-    survey::{EXPLAINED_M, FINAL_SIGMA_M, SurveyOptions},
     trace::unexplained,
     workspace::Workspace,
 };

@@ -17,7 +17,8 @@ use crate::{
     error::SurveyError,
     judge::Judge,
     line::{Line, off_square_rad, square_axis},
-    odometry::{Move, OdometrySigma},
+    odometry::Move,
+    options::{EXPLAINED_M, FINAL_SIGMA_M, SurveyOptions},
     polish::polish,
     posed::PosedPlan,
     progress::{NoObserver, SurveyObserver, SurveyProgress, SurveyStage},
@@ -30,31 +31,6 @@ use crate::{
     trace::unexplained,
     workspace::Workspace,
 };
-
-/// Assumptions and limits of a survey.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SurveyOptions {
-    /// Errors of the sweeps' poses as odometry; `None` to ignore these poses.
-    pub odometry: Option<OdometrySigma>,
-    /// Standard deviation of directions of walls from a common square axis, degrees; `None` for any
-    /// directions.
-    pub square_deg: Option<f64>,
-    /// Amplitude reflection coefficient of all walls, 0 to 1.
-    pub reflectance: f64,
-    /// Maximum number of scored scenes.
-    pub max_scenes: usize,
-}
-
-impl Default for SurveyOptions {
-    fn default() -> Self {
-        Self {
-            odometry: Some(OdometrySigma::default()),
-            square_deg: None,
-            reflectance: 0.97,
-            max_scenes: 30_000,
-        }
-    }
-}
 
 /// Round of the search for walls.
 struct Round {
@@ -75,14 +51,10 @@ const ROUNDS: [Round; 3] = [
 const MAX_RESTARTS: usize = 2;
 /// Length below which a wall is dropped by a restart, metres.
 const SHORT_M: f64 = 0.3;
-/// Standard deviation of ranges in the final score, metres.
-pub(crate) const FINAL_SIGMA_M: f64 = 0.004;
 /// Maximum number of rounds.
 const MAX_ROUNDS: usize = 6;
 /// Gain of a round below which the last one is not repeated, nats.
 const MIN_ROUND_GAIN: f64 = 0.5;
-/// Maximum error of a range that counts as explained, metres.
-pub(crate) const EXPLAINED_M: f64 = 0.012;
 const REFINE_STEPS: usize = 4;
 /// Share of the budget for the search; the rest is for alternatives.
 const SEARCH_SHARE: f64 = 0.7;
@@ -138,7 +110,7 @@ pub(crate) fn workspace<'a>(
     if sweeps.len() < 2 {
         return Err(SurveyError::TooFewSweeps(sweeps.len()));
     }
-    check(options)?;
+    options.check()?;
     let world = &empty_world(world, options.reflectance);
     let simulator = world.simulator(&sweeps[0].pose)?;
     let max_range_m = simulator.receiver().max_range_m;
@@ -153,24 +125,6 @@ pub(crate) fn workspace<'a>(
         Some((_, sweep)) => Err(SurveyError::NoArcs(sweep.scan)),
         None => Ok(workspace),
     }
-}
-
-fn check(options: &SurveyOptions) -> Result<(), SurveyError> {
-    let SurveyOptions { odometry, square_deg, reflectance, .. } = *options;
-    let odometry = odometry.unwrap_or_default();
-    let positive = "positive and finite";
-    let checks = [
-        ("reflectance", reflectance, reflectance > 0.0 && reflectance <= 1.0, "above 0, up to 1"),
-        ("m_per_m", odometry.m_per_m, odometry.m_per_m > 0.0, positive),
-        ("deg_per_m", odometry.deg_per_m, odometry.deg_per_m > 0.0, positive),
-        ("square_deg", square_deg.unwrap_or(1.0), square_deg.unwrap_or(1.0) > 0.0, positive),
-    ];
-    for (name, value, is_valid, expected) in checks {
-        if !is_valid || !value.is_finite() {
-            return Err(SurveyError::Option { name, value, expected });
-        }
-    }
-    Ok(())
 }
 
 /// World of an empty scene with the material of the walls, the transducer on the axis.

@@ -20,8 +20,9 @@ use crate::{
     arrangement::{LineArrangement, PieceSet},
     line::Line,
     odometry::OdometrySigma,
+    options::SurveyOptions,
     progress::SurveyObserver,
-    survey::{SurveyOptions, workspace},
+    survey::workspace,
     workspace::Workspace,
 };
 

@@ -46,7 +46,8 @@ fn remarks(found: &Survey) -> Vec<String> {
             "{conjectured_m:.2} m of walls are conjectured: readings hardly depend on them"
         ));
     }
-    if found.alternatives.is_empty() {
+    let is_settled = matches!(found.end, SearchEnd::Complete | SearchEnd::UnexplainedArcs);
+    if found.alternatives.is_empty() && is_settled {
         remarks.push("no other plan is within 10 nats of this one".to_owned());
     }
     for (other, number) in found.alternatives.iter().zip(1..) {

@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 
 use sonard_model::geometry::{DVec2, Pose, encloses};
 
-use super::PlanMove;
+use super::plan_move::PlanMove;
 use crate::arrangement::LineArrangement;
 
 /// Maximum angle between opposite sides, radians.

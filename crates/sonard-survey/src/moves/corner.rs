@@ -2,7 +2,7 @@
 
 use sonard_model::geometry::{DVec2, distance_to_segment};
 
-use super::{PlanMove, to_next_wall};
+use super::plan_move::{PlanMove, to_next_wall};
 use crate::arrangement::{LineArrangement, PieceSet, Run};
 
 /// Maximum distance of a point feature from the corner of two lines, metres.

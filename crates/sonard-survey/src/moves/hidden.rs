@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use sonard_model::geometry::{DVec2, Pose};
 
-use super::{PlanMove, to_next_wall};
+use super::plan_move::{PlanMove, to_next_wall};
 use crate::{
     arrangement::{LineArrangement, PieceSet, Run},
     line::Foot,
