@@ -52,10 +52,10 @@ pub(super) struct Args {
     /// Keep conjectured stretches of walls in scene.json
     #[arg(long)]
     closed: bool,
-    /// Maximum range of readings used, metres; longer ranges count as no echo
+    /// Maximum range, metres, instead of the sensor's; longer ranges count as no echo
     #[arg(long, value_name = "M", default_value_t = 5.0, value_parser = within(0.3..=20.0))]
     max_range: f64,
-    /// Amplitude reflection coefficient of the walls
+    /// Reflectance (amplitude) of all surfaces, 0 to 1
     #[arg(long, value_name = "R", default_value_t = 0.97, value_parser = within(0.05..=1.0))]
     reflectance: f64,
     /// Budget of the search: maximum number of floor plans whose readings are predicted

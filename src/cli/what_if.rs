@@ -15,8 +15,8 @@ use crate::{
 #[derive(Debug, Clone, clap::Args)]
 #[command(next_help_heading = "What if")]
 pub(super) struct WhatIfArgs {
-    /// Pose of the ranger, assumed for all scans: X,Y,DEG (metres, degrees), or the name of a pose
-    /// in the scene given by --scene
+    /// Pose of the ranger: X,Y,DEG (metres, degrees) or the name of a pose in the scene given by
+    /// --scene; assumed for all scans
     #[arg(long, value_name = "POSE", allow_hyphen_values = true)]
     pose: Option<String>,
     /// Assumed heading, degrees counter-clockwise from the x axis

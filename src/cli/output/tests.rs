@@ -84,6 +84,7 @@ fn plain_paths_are_inputs() {
         "status fleet",
         "status socket",
         "status token_file",
+        "survey logs",
         "trace scene",
         "watch fleet",
         "watch socket",
