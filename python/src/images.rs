@@ -92,12 +92,8 @@ pub(crate) fn image_sources<'py>(
 fn places(given: &Bound<'_, PyAny>, name: &str) -> PyResult<(Vec<[f64; 3]>, Vec<usize>)> {
     let (numbers, mut shape) = arrays::flattened(given)?;
     match shape.pop() {
-        Some(2) => {
-            Ok((numbers.chunks_exact(2).map(|at| [at[0], at[1], 0.0]).collect(), shape))
-        }
-        Some(3) => {
-            Ok((numbers.chunks_exact(3).map(|at| [at[0], at[1], at[2]]).collect(), shape))
-        }
+        Some(2) => Ok((numbers.chunks_exact(2).map(|at| [at[0], at[1], 0.0]).collect(), shape)),
+        Some(3) => Ok((numbers.chunks_exact(3).map(|at| [at[0], at[1], at[2]]).collect(), shape)),
         _ => Err(PyValueError::new_err(format!(
             "the last axis of {name} must be x_m, y_m or x_m, y_m, z_m"
         ))),

@@ -137,6 +137,7 @@ pages! {
     mock: "mock.md",
     model: "model.md",
     reality: "reality.md",
+    survey: "survey.md",
     teaching: "teaching.md",
 }
 
