@@ -11,7 +11,7 @@ const MAX_EXCERPT_COLUMNS: usize = 140;
 const ERROR: Style = AnsiColor::BrightRed.on_default().bold();
 const HELP: Style = AnsiColor::BrightCyan.on_default().bold();
 
-/// Description of a failure. `Display` writes the message alone, [`render`](Self::render) all of it.
+/// Description of a failure. `Display` writes the message alone, without help and excerpt.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Diagnostic {
     message: String,
