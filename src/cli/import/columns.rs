@@ -24,8 +24,8 @@ pub(super) struct ColumnArgs {
     #[arg(long, value_name = "FORMAT", value_parser = format())]
     format: Option<Format>,
     /// File (TOML) with these settings; keys: format, columns, topics, device, clockwise, zero_deg,
-    /// azimuth_deg, unordered, none, none_from, sound_speed_m_s, range_unit, decimal, encoding, time_format,
-    /// utc_offset, started. Options take precedence
+    /// azimuth_deg, unordered, none, none_from, sound_speed_m_s, range_unit, decimal, encoding,
+    /// time_format, utc_offset, started. Options take precedence
     #[arg(long, value_name = "FILE")]
     mapping: Option<PathBuf>,
     /// Topic of a recording to read (repeatable) [default: all Range except predictions, else

@@ -10,8 +10,8 @@ use crate::{ImportError, ImportedReading, scans::is_same_scan, sweep_end::SweepD
 /// Minimum number of readings for the check.
 const MIN_READINGS: u64 = 16;
 /// Share of the steps that reverse the rotation, above which the order is random. A sweep of `n`
-/// stops reverses at most `2 / n` of them; in random order it is a half on a circle, two thirds in a
-/// sector.
+/// stops reverses at most `2 / n` of them; in random order it is a half on a circle, two thirds in
+/// a sector.
 const MAX_REVERSALS: f64 = 0.3;
 /// Number of equal parts of the covered sector, and the minimum number of them with readings:
 /// fewer may be the few stops of a servo.
