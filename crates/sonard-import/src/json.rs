@@ -65,10 +65,9 @@ pub(crate) fn objects<'a>(
         if line.trim().is_empty() {
             continue;
         }
-        let is_whole = std::mem::take(&mut is_first)
-            && read(&line).is_ok_and(|value| value.is_object() || is_scalar_row(&value));
-        if is_whole {
-            let first = std::iter::once(parse(1, &text));
+        let first = if std::mem::take(&mut is_first) { whole_line(&line) } else { None };
+        if let Some(first) = first {
+            let first = std::iter::once(Ok(first));
             let rest =
                 lines.filter(|line| !line.as_ref().is_ok_and(|line| line.text.trim().is_empty()));
             let objects = first.chain(rest.map(|line| {
@@ -118,6 +117,16 @@ fn wrapped_list(value: &Value, depth: u32) -> Option<&Vec<Value>> {
         }
         _ => None,
     }
+}
+
+/// Parses a line that is an object or a row of numbers, as all lines of JSON Lines are.
+fn whole_line(line: &str) -> Option<Value> {
+    // A document in one line may be long; its list of lists or objects is no row.
+    let list = line.trim_start().strip_prefix('[').map(str::trim_start);
+    if list.is_some_and(|entries| entries.starts_with(['[', '{'])) {
+        return None;
+    }
+    read(line).ok().filter(|value| value.is_object() || is_scalar_row(value))
 }
 
 /// Returns `true` for a list of at least two scalars, a row of numbers.

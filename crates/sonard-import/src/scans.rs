@@ -252,7 +252,7 @@ fn plan(azimuths: &[f64]) -> (ScanPlan, Vec<u32>) {
 
 /// Returns the order of azimuths counter-clockwise from the end of their greatest gap, and the
 /// azimuths in that order.
-fn by_direction(azimuths: &[f64]) -> (Vec<usize>, Vec<f64>) {
+pub(crate) fn by_direction(azimuths: &[f64]) -> (Vec<usize>, Vec<f64>) {
     let mut order: Vec<usize> = (0..azimuths.len()).collect();
     order.sort_by(|a, b| azimuths[*a].total_cmp(&azimuths[*b]));
     let gap_deg = |at: usize| {

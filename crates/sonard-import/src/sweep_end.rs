@@ -6,7 +6,7 @@ use sonard_model::geometry::wrap_180;
 /// Minimum number of steps in one sense that count as a rotation; fewer may be unordered readings.
 const MIN_STEPS: u32 = 2;
 /// Tolerance for equal directions, degrees.
-const SAME_DEG: f64 = 1e-3;
+pub(crate) const SAME_DEG: f64 = 1e-3;
 /// Share of the usual step below which a backward step is jitter of the mount.
 const JITTER: f64 = 0.5;
 

@@ -8,7 +8,7 @@ use crate::{
     Assumptions, FileLocation, ImportedReading,
     reading::RawReading,
     scans::{self, ArrayFiring, MAX_FIRINGS},
-    sweep_end::SweepDetector,
+    sweep_end::{SAME_DEG, SweepDetector},
 };
 
 /// Splits a stream of readings into scans: for a rotating ranger where it returns to its first
@@ -25,9 +25,6 @@ pub(super) struct ScanCollector<'a> {
     sweep: SweepDetector,
     scans: u64,
 }
-
-/// Tolerance for equal directions, degrees.
-const SAME_DEG: f64 = 1e-3;
 
 impl<'a> ScanCollector<'a> {
     pub(super) fn new(

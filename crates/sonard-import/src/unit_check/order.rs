@@ -5,7 +5,11 @@ use std::collections::BTreeSet;
 use sonard_model::geometry::{wrap_180, wrap_360};
 
 use super::{UnitContext, implausible};
-use crate::{ImportError, ImportedReading, scans::is_same_scan, sweep_end::SweepDetector};
+use crate::{
+    ImportError, ImportedReading,
+    scans::{by_direction, is_same_scan},
+    sweep_end::{SAME_DEG, SweepDetector},
+};
 
 /// Minimum number of readings for the check.
 const MIN_READINGS: u64 = 16;
@@ -17,10 +21,8 @@ const MAX_REVERSALS: f64 = 0.3;
 /// fewer may be the few stops of a servo.
 const PARTS: usize = 16;
 const MIN_OCCUPIED: usize = 13;
-/// Resolution of the counted directions, in parts of a revolution.
-const RESOLUTION: u16 = 3600;
-/// Tolerance for equal directions, degrees.
-const SAME_DEG: f64 = 1e-3;
+/// Number of counted directions per degree.
+const PER_DEG: f64 = 10.0;
 
 /// Sense of rotation from reading to reading, for readings without scan identifiers.
 #[derive(Debug, Default)]
@@ -35,6 +37,7 @@ pub(super) struct SweepOrder {
     steps: u64,
     reversals: u64,
     sense: f64,
+    /// Directions in units of 1 / [`PER_DEG`].
     directions: BTreeSet<u16>,
 }
 
@@ -59,8 +62,7 @@ impl SweepOrder {
             self.sense = step_deg.signum();
         }
         self.readings += 1;
-        let part = wrap_360(reading.direction_deg) / 360.0 * f64::from(RESOLUTION);
-        self.directions.insert(part.round() as u16 % RESOLUTION);
+        self.directions.insert(in_units(wrap_360(reading.direction_deg)));
         self.last = Some(reading.clone());
     }
 
@@ -88,14 +90,18 @@ impl SweepOrder {
 
     /// Returns how many of the [`PARTS`] of the covered sector have readings.
     fn occupied_parts(&self) -> usize {
-        let around = self.directions.iter().chain(self.directions.first());
-        let gaps = around.clone().zip(around.skip(1)).map(|(from, to)| {
-            let gap = (to + RESOLUTION - from) % RESOLUTION;
-            (if gap == 0 { RESOLUTION } else { gap }, *to)
-        });
-        let Some((gap, first)) = gaps.max() else { return 0 };
-        let covered = usize::from(RESOLUTION - gap) + 1;
-        let part = |at: &u16| usize::from((at + RESOLUTION - first) % RESOLUTION) * PARTS / covered;
-        self.directions.iter().map(part).collect::<BTreeSet<_>>().len()
+        let directions: Vec<f64> =
+            self.directions.iter().map(|units| f64::from(*units) / PER_DEG).collect();
+        let (_, sorted) = by_direction(&directions);
+        let (Some(first), Some(last)) = (sorted.first(), sorted.last()) else { return 0 };
+        let from_first = |deg: &f64| usize::from(in_units(wrap_360(deg - first)));
+        let covered = from_first(last) + 1;
+        let parts = sorted.iter().map(|deg| from_first(deg) * PARTS / covered);
+        parts.collect::<BTreeSet<_>>().len()
     }
+}
+
+/// Converts a direction of 0 to 360 degrees to units of 1 / [`PER_DEG`].
+fn in_units(direction_deg: f64) -> u16 {
+    (direction_deg * PER_DEG).round() as u16 % (360.0 * PER_DEG) as u16
 }
