@@ -2,6 +2,7 @@
 
 mod clip;
 mod file;
+mod limits;
 mod outline;
 
 use sonard_model::scene::Surfaces;
@@ -27,7 +28,7 @@ const MAX_DEPTH: usize = 256;
 /// Reads the walls of a drawing: every visible line.
 ///
 /// # Errors
-/// Returns an error for a file that is not SVG.
+/// Returns an error for a file that is not SVG, and for coordinates beyond 1e7 units.
 pub fn read(bytes: &[u8], options: &SvgOptions) -> Result<FloorPlan, PlanError> {
     let file::Drawing { text, notes, has_size } = file::prepare(bytes, HELP)?;
     let tree = Tree::from_str(&text, &Options::default())

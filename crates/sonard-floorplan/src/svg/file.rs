@@ -4,6 +4,7 @@ use std::{collections::BTreeMap, ops::Range};
 
 use roxmltree::{Document, Node};
 
+use super::limits::check_lengths;
 use crate::{PlanError, xml};
 
 /// Text of a drawing, with notes on it.
@@ -19,10 +20,11 @@ pub(super) struct Drawing {
 /// preserved, so that errors refer to the right lines.
 ///
 /// # Errors
-/// Returns an error for a file that is not XML.
+/// Returns an error for a file that is not XML, and for lengths beyond the limit.
 pub(super) fn prepare(bytes: &[u8], help: &str) -> Result<Drawing, PlanError> {
     let text = xml::text(bytes, help)?.into_owned();
     let document = xml::parse(&text, help)?;
+    check_lengths(&document)?;
     let root = document.root_element();
     let is_relative = |width: &str| width.trim().ends_with('%') || width.trim() == "auto";
     let has_size = root.attribute("viewBox").is_some()

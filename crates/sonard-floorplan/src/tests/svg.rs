@@ -63,3 +63,14 @@ fn clip_paths_of_any_shape() {
         assert_eq!(found, expected, "{clip}");
     }
 }
+
+#[test]
+fn curves_of_any_size_are_bounded() {
+    // The outline of an unbounded curve is computed without end.
+    for great in ["<circle r='1e30'/>", "<path d='M3,1e30 A20,20 0 0 1 50,10'/>"] {
+        let error = drawing(&page(great)).expect_err("no drawing");
+        assert!(error.to_string().contains("more than 1e7"), "{error}");
+    }
+    let arc = page("<path d='M0,9999999 A20,20 0 0 1 50,10'/>");
+    assert!(walls(&drawing(&arc).expect("a drawing")).len() <= 512);
+}
