@@ -13,13 +13,13 @@ pub(crate) mod view;
 mod viewpoints;
 mod workbench;
 
-use std::path::Path;
+use std::{fs, path::Path};
 
 use fantoccini::key::Key;
 use serde_json::{Value, json};
 
 use browser::{Browser, DESK};
-use sonard_test_support::{daemon::Daemon, wait_until};
+use sonard_test_support::{daemon::Daemon, run, stderr, wait_until};
 
 /// Sweep of a hundred beams, which takes about four seconds.
 const PLAN: [&str; 4] = ["--set", "plan.step_deg=3.6", "--set", "model.max_range_m=3"];
@@ -52,6 +52,21 @@ fn show_log(daemon: &Daemon, browser: &Browser, log: &str) -> Value {
     browser.eval(&format!("document.querySelector('{button}').click()"));
     browser.until(&format!("document.querySelector('{button}').ariaPressed === 'true'"));
     daemon.get(&format!("/v1/scans/{scan}")).json()
+}
+
+/// Writes a log of a simulated scan, named 20260102, with predictions by other options.
+fn write_predicted_log(folder: &Path, simulate: &[&str], predict: &[&str]) {
+    let log = folder.join("log");
+    fs::create_dir_all(&log).expect("there is room");
+    let [raw, log] = [folder.join("raw.jsonl"), log.join("sonard-20260102T000000Z.jsonl")];
+    let [raw, log] = [&raw, &log].map(|path| path.to_str().expect("plain"));
+    for command in [
+        [&["simulate"], simulate, &["--output", raw]].concat(),
+        [&["predict", raw], predict, &["--output", log]].concat(),
+    ] {
+        let output = run(&command);
+        assert!(output.status.success(), "{}", stderr(&output));
+    }
 }
 
 /// Number of beams in the page's caption of the scan.

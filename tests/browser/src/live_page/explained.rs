@@ -7,12 +7,12 @@ use sonard::{mock::Pace, scene::shipped};
 use super::{
     assert_clean,
     browser::{Browser, DESK},
-    count_pixels, show_log,
+    count_pixels, show_log, write_predicted_log,
 };
 use sonard_test_support::{
     daemon::{Daemon, write_token},
     rig::Rig,
-    run, stderr, wait_until,
+    run, wait_until,
 };
 
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
@@ -180,18 +180,11 @@ fn air_and_threshold_are_previewed() {
 #[test]
 fn causes_of_an_unlocated_scan_are_listed() {
     let folder = tempfile::tempdir().expect("a folder");
-    let log = folder.path().join("log");
-    fs::create_dir_all(&log).expect("there is room");
-    let [raw, log] = [folder.path().join("raw.jsonl"), log.join("sonard-20260102T000000Z.jsonl")];
-    let [raw, log] = [&raw, &log].map(|path| path.to_str().expect("plain"));
-    let steps = ["--step-deg", "3.6", "--max-range", "4", "-o", raw];
-    for command in [
-        [&["simulate", "--scene", "mcgill-lab", "--pose", "fig4"][..], &steps].concat(),
-        vec!["predict", raw, "--scene", "simple-room", "--pose", "fig9", "-o", log],
-    ] {
-        let output = run(&command);
-        assert!(output.status.success(), "{}", stderr(&output));
-    }
+    write_predicted_log(
+        folder.path(),
+        &["--scene", "mcgill-lab", "--pose", "fig4", "--step-deg", "3.6", "--max-range", "4"],
+        &["--scene", "simple-room", "--pose", "fig9"],
+    );
     let options = ["--set", "server.listen=127.0.0.1:0", "--set", "scanning.mode=on-request"];
     let daemon = Daemon::start_mock(folder.path(), &options);
     daemon.wait_for("ready");

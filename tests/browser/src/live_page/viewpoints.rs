@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use super::{
     browser::{Browser, DESK},
-    show_log,
+    show_log, write_predicted_log,
 };
 use sonard_test_support::{
     daemon::{start_ahead, start_array},
@@ -248,20 +248,12 @@ fn residual_heights(browser: &Browser, rangers: usize) -> Vec<Option<f64>> {
 
 /// Writes a log of an array whose predictions are from a pose 4 cm away.
 fn write_displaced_array(folder: &Path) {
-    let log = folder.join("log");
-    fs::create_dir_all(&log).expect("there is room");
-    let [raw, log] = [folder.join("raw.jsonl"), log.join("sonard-20260102T000000Z.jsonl")];
-    let [raw, log] = [&raw, &log].map(|path| path.to_str().expect("plain"));
     let scene = ["--scene", "mcgill-lab", "--pose"];
-    let simulate = ["fig4", "--array", "pioneer-8", "--output", raw];
-    let predict = ["3.44,1.46,2", "--output", log];
-    for command in [
-        [&["simulate"][..], &scene, &simulate].concat(),
-        [&["predict", raw][..], &scene, &predict].concat(),
-    ] {
-        let output = run(&command);
-        assert!(output.status.success(), "{}", stderr(&output));
-    }
+    write_predicted_log(
+        folder,
+        &[&scene[..], &["fig4", "--array", "pioneer-8"]].concat(),
+        &[&scene[..], &["3.44,1.46,2"]].concat(),
+    );
 }
 
 /// Writes a log of a ring of twelve sonars that is turned in place and fired three times.
