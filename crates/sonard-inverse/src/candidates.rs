@@ -111,30 +111,25 @@ impl ThresholdScan {
     ) -> Result<(), TooCostly> {
         point.evaluate(direction_rad, |firing| {
             found.clear();
-            firing.evaluate_thresholds(&self.receiver, |listening| {
-                self.scan(firing, listening, found);
+            firing.evaluate_thresholds(&self.receiver, |bank| {
+                self.scan(firing, bank, found);
             });
         })
     }
 
     /// Scans upwards. A higher threshold is crossed no earlier, so time runs forward as well.
-    fn scan(
-        &self,
-        firing: &FiringArrivals,
-        listening: &mut DetectorBank,
-        found: &mut CandidateList,
-    ) {
+    fn scan(&self, firing: &FiringArrivals, bank: &mut DetectorBank, found: &mut CandidateList) {
         let mut last: Option<ReportedRise> = None;
         let (mut by_db, mut ready_us) = (-self.span_db, 0.0);
         while by_db < self.span_db && found.len() < MAX_CANDIDATES {
-            let Some(rise) = listening.first_rise(self.factor(by_db), ready_us) else {
+            let Some(rise) = bank.first_rise(self.factor(by_db), ready_us) else {
                 // No echo at any higher threshold.
                 found.push(ThresholdCandidate::no_echo(self.span_db));
                 return;
             };
             ready_us = rise.passed_us;
-            let first = Self::reported(listening, rise, by_db);
-            let (next, until_db) = self.at_likely_threshold(listening, first, ready_us);
+            let first = Self::reported(bank, rise, by_db);
+            let (next, until_db) = self.at_likely_threshold(bank, first, ready_us);
             by_db = until_db.max(next.by_db + STEP_DB) + ABOVE_DB;
             let is_same = |last: &ReportedRise| self.is_same(last, &next.rise, next.by_db);
             match found.last_mut() {
@@ -152,26 +147,26 @@ impl ThresholdScan {
     /// well.
     fn at_likely_threshold(
         &self,
-        listening: &mut DetectorBank,
+        bank: &mut DetectorBank,
         first: ReportedRise,
         ready_us: f64,
     ) -> (ReportedRise, f64) {
-        let until_db = self.lost(listening, &first, ready_us);
+        let until_db = self.lost(bank, &first, ready_us);
         let at_db = (until_db - BELOW_DB).min(0.0);
         if first.by_db >= at_db {
             return (first, until_db);
         }
-        let rise = listening.first_rise(self.factor(at_db), ready_us);
+        let rise = bank.first_rise(self.factor(at_db), ready_us);
         let Some(rise) = rise.filter(|rise| self.is_same(&first, rise, at_db)) else {
             return (first, until_db);
         };
         let evaluated = match self.needs_peak(until_db) {
-            true => Self::reported(listening, rise, at_db),
+            true => Self::reported(bank, rise, at_db),
             false => ReportedRise { rise, by_db: at_db, ..first },
         };
         // The effective threshold drifts while an echo rises: a later evaluation is more accurate.
         let until_db =
-            if evaluated.is_lone { self.lost(listening, &evaluated, ready_us) } else { until_db };
+            if evaluated.is_lone { self.lost(bank, &evaluated, ready_us) } else { until_db };
         (evaluated, until_db)
     }
 
@@ -197,9 +192,9 @@ impl ThresholdScan {
     }
 
     /// Rise detected at a threshold, with the reach of its envelope.
-    fn reported(listening: &mut DetectorBank, rise: EchoRise, by_db: f64) -> ReportedRise {
-        let (peak, margin_db) = listening.peak(&rise);
-        let (reaches_db, is_lone) = (by_db + margin_db.max(0.0), listening.is_isolated());
+    fn reported(bank: &mut DetectorBank, rise: EchoRise, by_db: f64) -> ReportedRise {
+        let (peak, margin_db) = bank.peak(&rise);
+        let (reaches_db, is_lone) = (by_db + margin_db.max(0.0), bank.is_isolated());
         ReportedRise { rise, by_db, peak, reaches_db, is_lone }
     }
 
@@ -223,7 +218,7 @@ impl ThresholdScan {
 
     /// Detection limit of a reported rise: the peak of its envelope, unless another arrival follows
     /// so closely that the peak belongs to that one.
-    fn lost(&self, listening: &mut DetectorBank, reported: &ReportedRise, ready_us: f64) -> f64 {
+    fn lost(&self, bank: &mut DetectorBank, reported: &ReportedRise, ready_us: f64) -> f64 {
         let ReportedRise { by_db: from_db, reaches_db, is_lone, .. } = *reported;
         let span_db = self.span_db;
         if is_lone {
@@ -234,7 +229,7 @@ impl ThresholdScan {
             return reaches_db.min(span_db.max(from_db));
         }
         let mut is_reported = |by_db: f64| {
-            let rise = listening.first_rise(self.factor(by_db), ready_us);
+            let rise = bank.first_rise(self.factor(by_db), ready_us);
             rise.is_some_and(|rise| self.is_same(reported, &rise, by_db))
         };
         match is_reported(beyond_db) {

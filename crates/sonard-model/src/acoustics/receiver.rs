@@ -17,8 +17,8 @@
 //! all echoes and is left out as well.
 
 mod detection;
+mod detector;
 mod detector_bank;
-mod envelope;
 mod gain;
 mod noise;
 mod trace;
@@ -36,7 +36,7 @@ pub use self::{
 };
 
 use self::{
-    envelope::EnvelopeSum,
+    detector::Firing,
     gain::{Sensitivity, gain_db},
 };
 use super::{ApertureResponse, Detector, EchoShape, Gain, Incidence, Response, Sensor};
@@ -130,6 +130,14 @@ pub struct Incident {
     pub incidence: Incidence,
 }
 
+impl Combining {
+    /// Returns `true` if pulses rise and decay: echoes then have time walk, and a minimum level
+    /// above the threshold.
+    const fn has_pulse_shapes(self) -> bool {
+        !matches!(self, Self::Ideal)
+    }
+}
+
 impl Receiver {
     /// Creates the receiver of a sensor for a speed of sound in m/s.
     #[must_use]
@@ -175,7 +183,7 @@ impl Receiver {
     /// Returns `true` if detection needs an [`Incident`] for each arrival.
     #[must_use]
     pub const fn needs_incidents(&self) -> bool {
-        self.response.is_some() && !matches!(self.combining, Combining::Ideal)
+        self.response.is_some() && self.combining.has_pulse_shapes()
     }
 
     /// Detects the echoes of one firing. Arrivals are sorted by length; the detector is re-armed
@@ -186,8 +194,7 @@ impl Receiver {
     /// Sound that has ended by then is lost.
     #[must_use]
     pub fn detect(&self, arrivals: &[PulseArrival]) -> Detection {
-        let mut envelope = EnvelopeSum::new(self, arrivals, &|_| None);
-        self.quantized(self.detection(&mut envelope, Latch::Rearmed, 0.0))
+        self.detect_at_face(arrivals, &|_| None, Latch::Rearmed)
     }
 
     /// Detects echoes with the full aperture response of the face, if the sensor has one.
@@ -216,10 +223,8 @@ impl Receiver {
         latch: Latch,
         ready_us: f64,
     ) -> (Detection, Option<f64>) {
-        let mut envelope = EnvelopeSum::new(self, arrivals, incident);
-        envelope.limit_known_length(length_m);
-        let detection = self.detection(&mut envelope, latch, ready_us);
-        let needed_m = (!envelope.exceeds_horizon()).then(|| envelope.needed_m());
+        let firing = Firing { known_m: length_m, ..Firing::new(self, arrivals, incident) };
+        let (detection, needed_m) = self.detection(firing, latch, ready_us);
         (self.quantized(detection), needed_m)
     }
 
@@ -246,11 +251,8 @@ impl Receiver {
         rng: &mut impl rand::Rng,
     ) -> Detection {
         let track = noise.track(self, rng);
-        let mut detection = self.detection(
-            &mut EnvelopeSum::new(self, arrivals, incident).in_noise(&track),
-            Latch::Rearmed,
-            0.0,
-        );
+        let firing = Firing { noise: Some(&track), ..Firing::new(self, arrivals, incident) };
+        let (mut detection, _) = self.detection(firing, Latch::Rearmed, 0.0);
         for (i, echo_us) in detection.echoes_us.iter_mut().enumerate() {
             let jitter_us = noise.jitter(rng);
             if i > 0 || detection.status != PingStatus::MinRange {
@@ -292,7 +294,7 @@ impl Receiver {
     /// error in metres relative to the reference echo.
     #[must_use]
     pub fn time_walk_m(&self, margin_db: f64) -> f64 {
-        if self.combining == Combining::Ideal {
+        if !self.combining.has_pulse_shapes() {
             return 0.0;
         }
         let level = 10f64.powf(-margin_db.max(0.0) / 20.0);
@@ -303,7 +305,7 @@ impl Receiver {
     /// the level at which the envelope stays above the threshold for the integration time.
     #[must_use]
     pub fn min_margin_db(&self) -> f64 {
-        if self.combining == Combining::Ideal {
+        if !self.combining.has_pulse_shapes() {
             return 0.0;
         }
         let is_detected = |margin_db: f64| {

@@ -3,7 +3,10 @@
 
 use smallvec::SmallVec;
 
-use super::{Latch, PulseArrival, Receiver, envelope::EnvelopeSum};
+use super::{
+    Latch, PulseArrival, Receiver,
+    detector::{EchoDetector, Firing},
+};
 use crate::reading::PingStatus;
 
 /// Maximum number of echoes reported per firing.
@@ -29,34 +32,43 @@ pub struct Detection {
 }
 
 impl Receiver {
+    /// Detects the echoes of a firing that cannot raise ECHO before `ready_us`. If longer arrivals
+    /// than the known ones cannot change the detection, also returns the round-trip length, metres,
+    /// beyond which arrivals are irrelevant.
     pub(super) fn detection(
         &self,
-        envelope: &mut EnvelopeSum,
+        firing: Firing,
         latch: Latch,
         ready_us: f64,
-    ) -> Detection {
-        let mut echoes_us = SmallVec::new();
-        let Some(first_us) = envelope.next_rise(self.scan_start_us(ready_us)) else {
-            return self.no_echo(envelope);
+    ) -> (Detection, Option<f64>) {
+        let mut detector = firing.start_detector();
+        let detection = match detector.next_rise(self.scan_start_us(ready_us)) {
+            Some(first_us) => self.echoes(detector.as_mut(), first_us, latch),
+            None => self.no_echo(detector.as_mut(), firing.arrivals),
         };
+        (detection, detector.needed_m())
+    }
+
+    /// Reports the echoes from the first rise on.
+    fn echoes(&self, detector: &mut dyn EchoDetector, first_us: f64, latch: Latch) -> Detection {
+        let mut echoes_us = SmallVec::new();
         let status = self.status_at(first_us);
         let is_min_range = status == PingStatus::MinRange;
-        let reported_us =
-            first_us + if is_min_range { 0.0 } else { envelope.crest_after_us(first_us) };
-        let cause = envelope.cause(first_us);
-        let (peak, margin_db) = self.peak(envelope, first_us, cause.as_ref());
+        let reported_us = first_us + if is_min_range { 0.0 } else { detector.delay_us(first_us) };
+        let cause = detector.cause(first_us);
+        let (peak, margin_db) = self.peak(detector, first_us, cause.as_ref());
         let mut last_us = first_us;
         echoes_us.push(reported_us);
         while latch == Latch::Rearmed
             && echoes_us.len() < MAX_ECHOES
-            && let Some(next_us) = envelope.next_rise(last_us + self.rearm_us)
+            && let Some(next_us) = detector.next_rise(last_us + self.rearm_us)
         {
-            echoes_us.push(next_us + envelope.crest_after_us(next_us));
+            echoes_us.push(next_us + detector.delay_us(next_us));
             last_us = next_us;
         }
         let has_more_echoes = latch == Latch::Rearmed
             && echoes_us.len() == MAX_ECHOES
-            && envelope.next_rise(last_us + self.rearm_us).is_some();
+            && detector.next_rise(last_us + self.rearm_us).is_some();
         Detection {
             status,
             range_m: Some(self.range_m(reported_us)),
@@ -72,15 +84,15 @@ impl Receiver {
     /// effective threshold at that time, decibels. Valid only before a search for the next rise.
     pub(super) fn peak(
         &self,
-        envelope: &mut EnvelopeSum,
+        detector: &mut dyn EchoDetector,
         first_us: f64,
         cause: Option<&PulseArrival>,
     ) -> (f64, f64) {
         let peak = match self.status_at(first_us) {
-            PingStatus::MinRange => envelope.level(first_us),
-            _ => envelope.peak(first_us, cause),
+            PingStatus::MinRange => detector.level(first_us),
+            _ => detector.peak(first_us, cause),
         };
-        (peak, 20.0 * (peak / envelope.threshold_at(first_us)).log10())
+        (peak, 20.0 * (peak / detector.threshold_at(first_us)).log10())
     }
 
     /// Start of the envelope scan for a detector that cannot be raised before `ready_us`. Time
@@ -138,11 +150,10 @@ impl Receiver {
     }
 
     /// Result without an echo: the strongest arrival within the detection window.
-    fn no_echo(&self, envelope: &mut EnvelopeSum) -> Detection {
+    fn no_echo(&self, detector: &mut dyn EchoDetector, arrivals: &[PulseArrival]) -> Detection {
         let (echoes_us, window_us) = (SmallVec::new(), self.window_us());
         // Unknown arrivals may exceed the known ones.
-        let known: &[PulseArrival] =
-            if envelope.exceeds_horizon() { &[] } else { envelope.arrivals };
+        let known = if detector.needed_m().is_some() { arrivals } else { &[] };
         let relative =
             |arrival: &PulseArrival| arrival.amplitude / self.threshold_at(self.tof_us(arrival));
         let arrival = known
@@ -152,8 +163,8 @@ impl Receiver {
             .max_by(|a, b| relative(a).total_cmp(&relative(b)))
             .copied();
         let peak = arrival.map(|arrival| {
-            envelope.rewind();
-            envelope.peak(self.tof_us(&arrival), Some(&arrival))
+            detector.rewind_to(0.0);
+            detector.peak(self.tof_us(&arrival), Some(&arrival))
         });
         Detection {
             status: PingStatus::NoEcho,
@@ -162,7 +173,7 @@ impl Receiver {
             amplitude: peak,
             // The peak may exceed the threshold for less than the integration time.
             margin_db: arrival.zip(peak).map(|(arrival, peak)| {
-                let threshold = envelope.threshold_at(self.tof_us(&arrival));
+                let threshold = detector.threshold_at(self.tof_us(&arrival));
                 (20.0 * (peak / threshold).log10()).min(0.0)
             }),
             echoes_us,

@@ -1,13 +1,16 @@
 //! Detection of one firing at several thresholds.
 
-use super::{Incident, PulseArrival, Receiver, envelope::EnvelopeSum};
+use super::{
+    Incident, PulseArrival, Receiver,
+    detector::{EchoDetector, Firing},
+};
 use crate::reading::PingStatus;
 
 /// Receivers that differ only in their threshold, applied to one firing. The arrivals are summed
 /// once for all of them.
 pub struct DetectorBank<'a> {
     receiver: &'a Receiver,
-    envelope: EnvelopeSum<'a>,
+    detector: Box<dyn EchoDetector + 'a>,
 }
 
 /// First rise of ECHO at one of the thresholds.
@@ -34,9 +37,8 @@ impl Receiver {
         arrivals: &'a [PulseArrival],
         incident: &'a dyn Fn(&PulseArrival) -> Option<Incident>,
     ) -> DetectorBank<'a> {
-        let mut envelope = EnvelopeSum::new(self, arrivals, incident);
-        envelope.limit_known_length(length_m);
-        DetectorBank { receiver: self, envelope }
+        let firing = Firing { known_m: length_m, ..Firing::new(self, arrivals, incident) };
+        DetectorBank { receiver: self, detector: firing.start_detector() }
     }
 }
 
@@ -47,8 +49,8 @@ impl DetectorBank<'_> {
     pub fn first_rise(&mut self, factor: f64, ready_us: f64) -> Option<EchoRise> {
         let receiver = self.receiver;
         let from_us = receiver.scan_start_us(ready_us);
-        self.envelope.threshold_factor = factor;
-        if let Some((passed_us, arrival)) = self.envelope.isolated_rise_at(from_us) {
+        self.detector.set_threshold_factor(factor);
+        if let Some((passed_us, arrival)) = self.detector.next_isolated_rise(from_us) {
             let (status, arrival) = (PingStatus::Echo, Some(arrival));
             return Some(EchoRise {
                 status,
@@ -57,16 +59,16 @@ impl DetectorBank<'_> {
                 passed_us,
             });
         }
-        self.envelope.rewind_to(from_us);
-        let at_us = self.envelope.next_rise(from_us)?;
+        self.detector.rewind_to(from_us);
+        let at_us = self.detector.next_rise(from_us)?;
         let status = receiver.status_at(at_us);
         // As in a detection: a carrier comparator rises at the following crest.
         let later_us = match status {
-            PingStatus::Echo => self.envelope.crest_after_us(at_us),
+            PingStatus::Echo => self.detector.delay_us(at_us),
             _ => 0.0,
         };
         let range_m = receiver.range_m(at_us + later_us);
-        let arrival = self.envelope.cause(at_us);
+        let arrival = self.detector.cause(at_us);
         Some(EchoRise { status, range_m, arrival, passed_us: at_us })
     }
 
@@ -75,19 +77,19 @@ impl DetectorBank<'_> {
     /// `false` for detectors that do not use the envelope.
     #[must_use]
     pub fn is_isolated(&self) -> bool {
-        self.envelope.is_isolated()
+        self.detector.is_isolated()
     }
 
     /// Peak of the envelope for the last rise, and its level above the threshold, decibels.
     #[must_use]
     pub fn peak(&mut self, rise: &EchoRise) -> (f64, f64) {
-        self.receiver.peak(&mut self.envelope, rise.passed_us, rise.arrival.as_ref())
+        self.receiver.peak(self.detector.as_mut(), rise.passed_us, rise.arrival.as_ref())
     }
 
     /// Maximum round-trip length, metres, of arrivals that can influence the results so far; `None`
     /// if unknown longer ones could.
     #[must_use]
     pub fn max_relevant_length_m(&self) -> Option<f64> {
-        (!self.envelope.exceeds_horizon()).then(|| self.envelope.needed_m())
+        self.detector.needed_m()
     }
 }

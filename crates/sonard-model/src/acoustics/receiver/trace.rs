@@ -1,6 +1,6 @@
 //! Oscilloscope trace of a firing.
 
-use super::{Detection, Incident, Latch, PulseArrival, Receiver, envelope::EnvelopeSum};
+use super::{Detection, Incident, Latch, PulseArrival, Receiver, detector::Firing};
 
 /// Signal of one firing versus time.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,18 +56,17 @@ impl Receiver {
     ) -> EchoTrace {
         let step_us = step_us.max(1.0);
         let count = (until_us.clamp(0.0, self.window_us()) / step_us) as usize;
-        let mut sum = EnvelopeSum::new(self, arrivals, incident);
+        let mut detector = Firing::new(self, arrivals, incident).start_detector();
         let mut peaks = vec![(0.0, 0.0); arrivals.len()];
         let points = (0..=count)
             .map(|i| {
                 let t_us = i as f64 * step_us;
-                let envelope = sum.level(t_us);
-                for place in sum.active_indices() {
-                    let share = sum.share(place, t_us);
-                    if share > peaks[place].0 {
-                        peaks[place] = (share, t_us);
+                let envelope = detector.level(t_us);
+                detector.visit_levels(t_us, &mut |index, level| {
+                    if level > peaks[index].0 {
+                        peaks[index] = (level, t_us);
                     }
-                }
+                });
                 let (threshold, gain_db) = (self.threshold_at(t_us), self.gain_db(t_us));
                 TracePoint { t_us, envelope, threshold, gain_db }
             })

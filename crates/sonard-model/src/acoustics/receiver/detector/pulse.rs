@@ -4,7 +4,16 @@ use num_complex::Complex64;
 
 use crate::acoustics::EchoShape;
 
+/// Amplitude of a pulse, to be multiplied with the shape and the gain increase since firing, and
+/// its carrier phase, radians.
+pub(super) struct PulseSize {
+    pub(super) size: f64,
+    pub(super) phase_rad: f64,
+}
+
+/// Arrival with its shape and what bounds its part of the envelope.
 pub(super) struct ActivePulse {
+    /// Nominal time of flight, microseconds.
     pub(super) tof_us: f64,
     /// Start and end, microseconds after firing.
     pub(super) lasts_us: [f64; 2],
@@ -46,7 +55,7 @@ impl ActivePulse {
     /// strength of the pulses still active when it begins.
     pub(super) fn new(
         (tof_us, lasts_us): (f64, [f64; 2]),
-        (size, phase_rad): (f64, f64),
+        PulseSize { size, phase_rad }: PulseSize,
         shape: Option<Box<EchoShape>>,
         transmitted: &EchoShape,
         others: f64,
@@ -71,7 +80,7 @@ impl ActivePulse {
         self.size == 0.0
     }
 
-    pub(super) fn find_field(&mut self) {
+    pub(super) fn compute_field(&mut self) {
         if !self.has_field {
             self.field = Complex64::from_polar(self.size, self.phase_rad);
             self.has_field = true;

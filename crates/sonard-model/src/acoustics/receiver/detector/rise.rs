@@ -1,10 +1,12 @@
 //! Search for the time at which the envelope has exceeded the threshold for the integration time.
 
-use super::{ActivePulse, EnvelopeSum, IsolatedPulse, WINDOW_SLACK_US};
-use crate::{
-    acoustics::{Detector, Gain, PulseArrival},
-    reading::PingStatus,
+use super::{
+    EchoDetector as _, WINDOW_SLACK_US,
+    envelope::{EnvelopeDetector, IsolatedPulse},
+    pulse::ActivePulse,
+    sum::Summation,
 };
+use crate::acoustics::Gain;
 
 /// Sampling step of the envelope, microseconds: a third of the standard deviation of a 7 kHz
 /// filter's response, the shortest rise.
@@ -17,51 +19,28 @@ const LONG_STEP_US: f64 = 30.0;
 /// rises by at most one step in that time.
 const LONG_QUIET_US: f64 = 200.0;
 
-impl EnvelopeSum<'_> {
-    /// Next rise and its arrival at a threshold not below the last one's, if both rises belong to
-    /// the same isolated arrival. Earlier arrivals do not cross a higher threshold either. Returns
-    /// `None` if [`Self::next_rise`] is required. Valid for envelope detectors only.
-    pub(in super::super) fn isolated_rise_at(
-        &mut self,
-        from_us: f64,
-    ) -> Option<(f64, PulseArrival)> {
-        let IsolatedPulse { place, factor, from_us: search_from_us } = self.isolated?;
-        if factor > self.threshold_factor || from_us < search_from_us {
-            return None;
-        }
-        let (rise_us, lasts) = self.isolated_rise(&self.pulses[place], from_us)?;
-        let is_in_window = rise_us <= self.receiver.window_us() + WINDOW_SLACK_US;
-        if !lasts || !is_in_window || self.receiver.status_at(rise_us) != PingStatus::Echo {
-            return None;
-        }
-        self.examined_us = self.examined_us.max(rise_us + self.receiver.integration_us);
-        Some((rise_us, self.arrivals[place]))
-    }
-
-    /// Returns `true` if the last rise belongs to an isolated arrival.
-    pub(in super::super) const fn is_isolated(&self) -> bool {
-        self.isolated.is_some()
-    }
-
-    pub(super) fn next_rise_of_sum(&mut self, ready_us: f64) -> Option<f64> {
-        self.isolated = None;
-        let integration_us = self.receiver.integration_us;
-        let window_us = self.receiver.window_us() + WINDOW_SLACK_US;
+impl<S: Summation> EnvelopeDetector<'_, S> {
+    /// Searches the next rise for a detector that is ready from `ready_us` on.
+    pub(super) fn search_rise(&mut self, ready_us: f64) -> Option<f64> {
+        let receiver = self.track.firing.receiver;
+        let integration_us = receiver.integration_us;
+        let window_us = receiver.window_us() + WINDOW_SLACK_US;
         let in_window = |rise_us: f64| Some(rise_us.max(ready_us)).filter(|us| *us <= window_us);
         let (mut t_us, mut here) = (ready_us, self.relative_level(ready_us));
         // Time above the threshold minus time below it since then.
         let mut charge_us = 0.0_f64;
-        while t_us <= window_us + 2.0 * integration_us && !self.exceeds_horizon() {
-            if !here.is_above() && charge_us == 0.0 && self.watched != Some(self.active_range()) {
+        while t_us <= window_us + 2.0 * integration_us && !self.track.exceeds_horizon() {
+            if !here.is_above()
+                && charge_us == 0.0
+                && self.watched != Some(self.track.active_range())
+            {
                 match self.skip(t_us) {
                     Skip::Exhausted => return None,
                     Skip::Isolated { rise_us } => {
-                        let is_isolated = self.is_plain
-                            && self.receiver.detector == Detector::Envelope
-                            && self.is_isolated_now();
+                        let is_isolated = self.has_tabulated_rises() && self.is_isolated_now();
                         self.isolated = is_isolated.then_some(IsolatedPulse {
-                            place: self.over,
-                            factor: self.threshold_factor,
+                            index: self.track.active_range().0,
+                            factor: self.threshold.factor,
                             from_us: ready_us,
                         });
                         return in_window(rise_us);
@@ -70,7 +49,7 @@ impl EnvelopeSum<'_> {
                         (t_us, here) = (later_us, self.relative_level(later_us));
                         continue;
                     }
-                    Skip::To(_) => self.watched = Some(self.active_range()),
+                    Skip::To(_) => self.watched = Some(self.track.active_range()),
                 }
             }
             let missing_us = integration_us - charge_us;
@@ -102,37 +81,37 @@ impl EnvelopeSum<'_> {
 
     /// Next time at which the envelope may cross the threshold, from a time at which it is below.
     fn skip(&mut self, mut t_us: f64) -> Skip {
-        if self.noise.is_some() {
+        if self.track.firing.noise.is_some() {
             return Skip::To(t_us);
         }
         loop {
-            self.advance(t_us);
-            if self.exceeds_horizon() {
+            self.track.advance(t_us);
+            if self.track.exceeds_horizon() {
                 return Skip::Exhausted;
             }
-            let start_us = self.next_start_us();
+            let start_us = self.track.next_start_us();
             if self.may_pass(t_us) {
-                let live = &self.pulses[self.over..self.begun];
+                let live = self.track.active();
                 let [pulse] = live else { return Skip::To(t_us) };
                 if self.gain_steps_during(pulse) {
                     return Skip::To(t_us);
                 }
                 let Some((rise_us, lasts)) = self.isolated_rise(pulse, t_us) else {
                     // The crossing is in the past or absent.
-                    let end_us = pulse.tof_us + self.span_us.1 + 1e-3;
+                    let end_us = pulse.tof_us + self.track.span_us.1 + 1e-3;
                     match start_us {
                         Some(start_us) => t_us = start_us.min(end_us),
                         None => return self.exhausted(),
                     }
                     continue;
                 };
-                let done_us = rise_us + self.receiver.integration_us;
+                let done_us = rise_us + self.track.firing.receiver.integration_us;
                 if start_us.is_none_or(|start_us| start_us > done_us) {
                     if lasts {
-                        self.examined_us = self.examined_us.max(done_us);
+                        self.track.examine(done_us);
                         return Skip::Isolated { rise_us };
                     }
-                    t_us = pulse.tof_us + self.span_us.1 + 1e-3;
+                    t_us = pulse.tof_us + self.track.span_us.1 + 1e-3;
                     if let Some(start_us) = start_us {
                         t_us = t_us.min(start_us);
                     }
@@ -149,23 +128,23 @@ impl EnvelopeSum<'_> {
 
     /// Returns `true` if the active pulses, added in phase, could exceed the minimum threshold.
     fn may_pass(&mut self, t_us: f64) -> bool {
-        let minimum = self.threshold_factor * self.min_threshold;
-        let gain = self.gain_increase(t_us).max(1.0);
-        let last = self.pulses[self.over..self.begun].last();
+        let minimum = self.threshold.minimum();
+        let gain = self.track.gain_increase(t_us).max(1.0);
+        let last = self.track.active().last();
         // The first condition is a cheap upper bound of the second.
         last.is_some_and(|last| last.with_others * gain >= minimum)
-            && self.bounds().strength * gain >= minimum
+            && self.track.bounds().strength * gain >= minimum
     }
 
     /// Ends the scan without an echo, a result that depends on all arrivals.
     const fn exhausted(&mut self) -> Skip {
-        self.examined_us = f64::MAX;
+        self.track.examine(f64::MAX);
         Skip::Exhausted
     }
 
     /// Envelope relative to the threshold at a time. Times must not decrease between calls.
     fn relative_level(&mut self, t_us: f64) -> RelativeLevel {
-        let (level, threshold) = (self.level(t_us), self.threshold_at(t_us));
+        let (level, threshold) = (self.level(t_us), self.threshold.at(t_us));
         RelativeLevel { relative: level / threshold, threshold }
     }
 
@@ -173,15 +152,15 @@ impl EnvelopeSum<'_> {
     /// least the sampling step.
     fn quiet_us(&mut self, t_us: f64, here: &RelativeLevel) -> f64 {
         // The factor 1.1 covers the increase of the gain in that time.
-        let grows = 1.1 * self.gain_increase(t_us);
-        let steepest = self.bounds().steepest;
+        let grows = 1.1 * self.track.gain_increase(t_us);
+        let steepest = self.track.bounds().steepest;
         let threshold = here.threshold;
-        let start_us = self.next_start_us().unwrap_or(f64::INFINITY);
+        let start_us = self.track.next_start_us().unwrap_or(f64::INFINITY);
         let quiet_us =
             ((1.0 - here.relative) * threshold / (grows * steepest)).min(start_us - t_us);
-        let is_long = self.noise.is_none() && quiet_us.min(LONG_QUIET_US) > STEP_US;
+        let is_long = self.track.firing.noise.is_none() && quiet_us.min(LONG_QUIET_US) > STEP_US;
         // The threshold rises with range and falls at a gain step.
-        if is_long && self.threshold_at(t_us + quiet_us.min(LONG_QUIET_US)) >= threshold {
+        if is_long && self.threshold.at(t_us + quiet_us.min(LONG_QUIET_US)) >= threshold {
             quiet_us.min(LONG_QUIET_US)
         } else {
             STEP_US
@@ -190,36 +169,39 @@ impl EnvelopeSum<'_> {
 
     /// Threshold crossing of an isolated arrival after `t_us`, and whether it stays above for the
     /// integration time or is above again after it.
-    fn isolated_rise(&self, pulse: &ActivePulse, t_us: f64) -> Option<(f64, bool)> {
-        let at = |offset_us: f64| pulse.tof_us + offset_us - self.receiver.lead_us;
+    pub(super) fn isolated_rise(&self, pulse: &ActivePulse, t_us: f64) -> Option<(f64, bool)> {
+        let at = |offset_us: f64| pulse.tof_us + offset_us - self.track.firing.receiver.lead_us;
         let level_at =
-            |t_us: f64| self.threshold_at(t_us) / (pulse.size * self.gain_increase(t_us));
+            |t_us: f64| self.threshold.at(t_us) / (pulse.size * self.track.gain_increase(t_us));
         let mut rise_us = pulse.tof_us;
         // The threshold changes with range and the gain with time.
         for _ in 0..2 {
-            rise_us = at(self.shape(pulse).rise_us(level_at(rise_us))?);
+            rise_us = at(self.track.shape(pulse).rise_us(level_at(rise_us))?);
         }
         if rise_us < t_us {
             return None;
         }
-        let done_us = rise_us + self.receiver.integration_us - pulse.tof_us + self.receiver.lead_us;
-        Some((rise_us, self.shape(pulse).max_from(done_us) >= level_at(rise_us)))
+        let done_us = rise_us + self.track.firing.receiver.integration_us - pulse.tof_us
+            + self.track.firing.receiver.lead_us;
+        Some((rise_us, self.track.shape(pulse).max_from(done_us) >= level_at(rise_us)))
     }
 
     /// Returns `true` if the only active pulse begins after the last one ended and ends before the
     /// next begins.
     fn is_isolated_now(&self) -> bool {
-        let (past, live) = self.pulses[..self.begun].split_at(self.over);
-        let [ActivePulse { lasts_us: [begins_us, ends_us], .. }] = live else { return false };
-        let is_last_over = past.last().is_none_or(|last| last.lasts_us[1] < *begins_us);
-        is_last_over && *ends_us < self.next_us
+        let [ActivePulse { lasts_us: [begins_us, ends_us], .. }] = self.track.active() else {
+            return false;
+        };
+        let is_last_over =
+            self.track.ended().last().is_none_or(|last| last.lasts_us[1] < *begins_us);
+        is_last_over && self.track.next_start_us().is_none_or(|next_us| *ends_us < next_us)
     }
 
     /// Returns `true` if a gain step begins during an arrival.
     fn gain_steps_during(&self, pulse: &ActivePulse) -> bool {
-        let Gain::Steps { steps } = &self.receiver.gain else { return false };
+        let Gain::Steps { steps } = &self.track.firing.receiver.gain else { return false };
         let [begins_us, ends_us] = pulse.lasts_us;
-        if self.step.get().holds_all(begins_us, ends_us) {
+        if self.threshold.holds_all(begins_us, ends_us) {
             return false;
         }
         let mut ends = steps.iter().filter_map(|step| step.until_us);
@@ -252,7 +234,7 @@ impl EnvelopeSum<'_> {
     /// Envelope over threshold at most one step before the last time examined.
     fn relative_level_back(&self, t_us: f64) -> f64 {
         // Pulses that have ended at the later time may still be active.
-        self.level_of(self.over.saturating_sub(8), t_us) / self.threshold_at(t_us)
+        self.sum(self.track.recently_active(), t_us) / self.threshold.at(t_us)
     }
 }
 
