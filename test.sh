@@ -105,7 +105,7 @@ check_documentation() {
 fuzz() {
   if [ "$fuzz_seconds" = 0 ]; then return; fi
   step "fuzz targets, $fuzz_seconds s each"
-  fuzz/smoke.sh "$fuzz_seconds" >"$work/fuzz" 2>&1 || {
+  FUZZ_SEED=${FUZZ_SEED:-2026} fuzz/smoke.sh "$fuzz_seconds" >"$work/fuzz" 2>&1 || {
     tail -n 60 "$work/fuzz"
     fail "a fuzz target found something: its input is in fuzz/artifacts"
   }

@@ -2,7 +2,7 @@
 # Runs every fuzz target for a bounded time: fuzz/smoke.sh [seconds each] [target...]
 # Needs no cargo-fuzz and no nightly: the coverage that libFuzzer steers by comes from LLVM
 # options that a stable compiler takes as well. For longer hunts with the address sanitizer:
-# RUSTC_BOOTSTRAP=1 cargo fuzz run <target>.
+# RUSTC_BOOTSTRAP=1 cargo fuzz run <target>. FUZZ_SEED=1 fixes the random numbers.
 set -eu
 cd "$(dirname "$0")"
 seconds=${1:-20}
@@ -22,6 +22,7 @@ is_slow() { ! (ulimit -t 10 && "$binaries/$target" -timeout=1000 "$1"); }
 for target in $targets; do
   mkdir -p "corpus/$target" "artifacts/$target" "seeds/$target"
   "$binaries/$target" "corpus/$target" "seeds/$target" -max_total_time="$seconds" -max_len=4096 -timeout=10 \
+    -seed="${FUZZ_SEED:-0}" \
     -artifact_prefix="artifacts/$target/" -print_final_stats=1 || {
     for input in "artifacts/$target"/*; do
       case $input in */timeout-*) if ! is_slow "$input"; then rm "$input" && continue; fi ;; esac

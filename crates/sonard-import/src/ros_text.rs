@@ -197,7 +197,8 @@ impl<'a> MessageConverter<'a> {
                 range_m: range.map(|range| range * self.mapping.metres()),
                 tof_us: None,
                 time: time.and_then(|time| {
-                    Timestamp::from_nanosecond(time.as_nanosecond() + delay_ns as i128).ok()
+                    let time_ns = time.as_nanosecond().saturating_add(delay_ns as i128);
+                    Timestamp::from_nanosecond(time_ns).ok()
                 }),
                 scan: scan.map(str::to_owned),
                 position_m: None,

@@ -111,11 +111,10 @@ impl<'a> TimeReader<'a> {
         seconds: f64,
     ) -> Result<Timestamp, InvalidTime> {
         let nanoseconds = if seconds.abs() >= MIN_CLOCK_S {
-            // Microseconds are the precision of a floating-point number of this size.
-            1000 * (seconds * 1e6).round() as i128
+            to_nanoseconds(seconds)
         } else {
             let since_s = self.since_start(field, seconds);
-            self.started.as_nanosecond().saturating_add(1000 * (since_s * 1e6).round() as i128)
+            self.started.as_nanosecond().saturating_add(to_nanoseconds(since_s))
         };
         Timestamp::from_nanosecond(nanoseconds).map_err(|_| {
             let field = field.map_or("time_s", Field::name);
@@ -290,6 +289,12 @@ const OF_DAY: [&str; 2] = ["%I:%M:%S%.f %p", "%I:%M %p"];
 /// Earliest year of a reading.
 const MIN_YEAR: i16 = 1970;
 
+/// Nanoseconds of a time or duration, seconds, to a microsecond: the precision of a floating-point
+/// number of today's time. Values out of range saturate.
+fn to_nanoseconds(seconds: f64) -> i128 {
+    ((seconds * 1e6).round() as i128).saturating_mul(1000)
+}
+
 /// Parses a time with its zone: ISO 8601, also with a blank before the zone, or RFC 2822.
 fn zoned(cell: &str) -> Option<Timestamp> {
     let utc = ["UTC", "GMT"].iter().find_map(|zone| cell.strip_suffix(zone));
@@ -381,6 +386,17 @@ mod tests {
         });
         let read = read.collect();
         (read, times.notes().join("\n"))
+    }
+
+    #[test]
+    fn numbers_beyond_the_calendar_are_rejected() {
+        let mapping = Mapping::default();
+        let mut times =
+            TimeReader::new(&mapping, STARTED.parse().expect("a time")).expect("an offset");
+        for seconds in [1e12, 1.7e75, -1.7e75, f64::MAX, f64::INFINITY] {
+            let (what, _) = times.number(None, seconds).expect_err("beyond the year 9999");
+            assert!(what.contains("9999"), "{what}");
+        }
     }
 
     #[test]
