@@ -9,6 +9,7 @@ mod error;
 mod file;
 mod floor_plan;
 mod locate;
+mod material;
 mod outline;
 mod parse;
 mod pose;
@@ -24,15 +25,13 @@ mod tests;
 pub use builder::SceneBuilder;
 pub use error::{SceneError, SceneProblem, sanitize, suggest};
 pub use floor_plan::{DEFAULT_SNAP_M, FloorPlan, PlanChange};
+pub use material::{Material, MaterialProperty};
 pub use pose::{PoseError, parse_pose};
 pub use robot::{Robot, RobotShape};
 pub use schema::json_schema;
 pub use surfaces::Surfaces;
 
 use std::{collections::BTreeMap, sync::Arc};
-
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 use crate::geometry::{DVec2, Pose, distance_to_segment};
 
@@ -89,24 +88,6 @@ impl Scene {
         let round = self.cylinders.iter().map(|c| at.distance(c.center) - c.radius_m);
         walls.chain(round).fold(f64::INFINITY, f64::min)
     }
-}
-
-/// Acoustic properties of a surface.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, expecting = "an object { ... }")]
-pub struct Material {
-    /// Amplitude of the mirror reflection relative to the incident wave, 0 to 1.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub reflectance: f64,
-    /// Share of the unabsorbed sound that is scattered instead of mirrored, 0 to 1.
-    #[serde(default)]
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub roughness: f64,
-}
-
-impl Material {
-    /// Perfectly reflecting, smooth surface.
-    pub const RIGID: Self = Self { reflectance: 1.0, roughness: 0.0 };
 }
 
 /// Flat reflector: one segment of the floor plan. Both faces reflect.

@@ -123,7 +123,6 @@ mod transducer;
 
 pub(super) use crosstalk::{CrosstalkPaths, TransducerPose};
 pub use engine::PathEngine;
-pub(super) use floor::mirror_gain;
 pub use interactions::EchoPath;
 pub(super) use mirror_paths::MirrorPath;
 pub use prepare::Paths;

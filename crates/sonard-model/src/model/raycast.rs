@@ -3,7 +3,7 @@
 use crate::{
     geometry::DVec2,
     model::{Edge, Reflector},
-    scene::{Cylinder, FloorPlan, Material, Scene},
+    scene::{Cylinder, FloorPlan, Scene},
 };
 
 /// Offset of a ray from the surface it leaves, metres, to avoid hitting the same surface.
@@ -54,7 +54,7 @@ impl Reflectors {
     /// Prepares the reflectors of a scene and its floor plan.
     #[must_use]
     pub fn new(scene: &Scene, plan: &FloorPlan) -> Self {
-        let mirror = |wall: u32| mirrored(&scene.walls[wall as usize].material);
+        let mirror = |wall: u32| scene.walls[wall as usize].material.mirror_amplitude();
         let walls = plan.walls.iter().zip(0..);
         let stretches = plan.uncovered_stretches();
         Self {
@@ -148,12 +148,6 @@ impl Reflectors {
     }
 }
 
-/// Reflectance of a material. Roughness is a share of the energy, hence the root; the ray engines
-/// lose the scattered part.
-fn mirrored(material: &Material) -> f64 {
-    material.reflectance * (1.0 - material.roughness).sqrt()
-}
-
 impl WallSegment {
     fn new((a, b): (DVec2, DVec2), mirror: f64) -> Self {
         let run = b - a;
@@ -188,7 +182,7 @@ impl CylinderCircle {
         Self {
             center: cylinder.center,
             radius_m: cylinder.radius_m,
-            mirror: mirrored(&cylinder.material),
+            mirror: cylinder.material.mirror_amplitude(),
         }
     }
 

@@ -4,10 +4,26 @@
 use smallvec::SmallVec;
 
 use super::{
-    Latch, PulseArrival, Receiver,
-    detector::{EchoDetector, Firing},
+    characteristics::{Incident, PulseArrival, Receiver},
+    detector::firing::{EchoDetector, Firing},
+    detector::start_detector,
+    noise::ReceiverNoise,
 };
 use crate::reading::PingStatus;
+
+/// Behaviour of ECHO after it has risen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Latch {
+    /// ECHO stays high until the next firing: only the first echo is timed.
+    #[default]
+    First,
+    /// A pulse on BLNK resets ECHO after each echo, up to eight times.
+    Rearmed,
+}
+
+/// Largest delay after the end of blanking, microseconds, at which ECHO is attributed to sound that
+/// was already present: about one cycle at 50 kHz, 3.4 mm of range.
+const BLANKING_TOLERANCE_US: f64 = 20.0;
 
 /// Maximum number of echoes reported per firing.
 const MAX_ECHOES: usize = 8;
@@ -32,6 +48,85 @@ pub struct Detection {
 }
 
 impl Receiver {
+    /// Detects the echoes of one firing. Arrivals are sorted by length; the detector is re-armed
+    /// after each echo.
+    ///
+    /// An arrival that begins before the detector is ready and still lasts then raises ECHO at that
+    /// moment. At the end of blanking this yields the minimum range, whatever the true distance.
+    /// Sound that has ended by then is lost.
+    #[must_use]
+    pub fn detect(&self, arrivals: &[PulseArrival]) -> Detection {
+        self.detect_at_face(arrivals, &|_| None, Latch::Rearmed)
+    }
+
+    /// Detects echoes with the full aperture response of the face, if the sensor has one.
+    /// `incident` returns the incidence of an arrival on the face; for `None` the arrival's
+    /// amplitude is used.
+    #[must_use]
+    pub fn detect_at_face(
+        &self,
+        arrivals: &[PulseArrival],
+        incident: &dyn Fn(&PulseArrival) -> Option<Incident>,
+        latch: Latch,
+    ) -> Detection {
+        self.detect_within(f64::INFINITY, arrivals, incident, latch, 0.0).0
+    }
+
+    /// Detects echoes as [`detect_at_face`](Self::detect_at_face) when only arrivals up to a
+    /// round-trip length in metres are known and ECHO cannot rise before `ready_us`. If longer
+    /// arrivals cannot change the detection, also returns the length, at most `length_m`, beyond
+    /// which arrivals are irrelevant.
+    #[must_use]
+    pub fn detect_within(
+        &self,
+        length_m: f64,
+        arrivals: &[PulseArrival],
+        incident: &dyn Fn(&PulseArrival) -> Option<Incident>,
+        latch: Latch,
+        ready_us: f64,
+    ) -> (Detection, Option<f64>) {
+        let firing = Firing { known_m: length_m, ..Firing::new(self, arrivals, incident) };
+        let (detection, needed_m) = self.detection(firing, latch, ready_us);
+        (self.quantized(detection), needed_m)
+    }
+
+    /// Detects echoes in noise. For a module that averages, the first echo is the mean over its
+    /// firings, if more than half of them detect one.
+    #[must_use]
+    pub fn detect_in_noise(
+        &self,
+        arrivals: &[PulseArrival],
+        incident: &dyn Fn(&PulseArrival) -> Option<Incident>,
+        noise: &ReceiverNoise,
+        rng: &mut impl rand::Rng,
+    ) -> Detection {
+        let firings =
+            (0..self.averaged_firings).map(|_| self.fire_in_noise(arrivals, incident, noise, rng));
+        self.quantized(self.average(firings.collect()))
+    }
+
+    fn fire_in_noise(
+        &self,
+        arrivals: &[PulseArrival],
+        incident: &dyn Fn(&PulseArrival) -> Option<Incident>,
+        noise: &ReceiverNoise,
+        rng: &mut impl rand::Rng,
+    ) -> Detection {
+        let track = noise.track(self, rng);
+        let firing = Firing { noise: Some(&track), ..Firing::new(self, arrivals, incident) };
+        let (mut detection, _) = self.detection(firing, Latch::Rearmed, 0.0);
+        for (i, echo_us) in detection.echoes_us.iter_mut().enumerate() {
+            let jitter_us = noise.jitter(rng);
+            if i > 0 || detection.status != PingStatus::MinRange {
+                *echo_us += jitter_us;
+            }
+        }
+        if detection.status == PingStatus::Echo {
+            detection.range_m = detection.echoes_us.first().map(|echo_us| self.range_m(*echo_us));
+        }
+        detection
+    }
+
     /// Detects the echoes of a firing that cannot raise ECHO before `ready_us`. If longer arrivals
     /// than the known ones cannot change the detection, also returns the round-trip length, metres,
     /// beyond which arrivals are irrelevant.
@@ -41,7 +136,7 @@ impl Receiver {
         latch: Latch,
         ready_us: f64,
     ) -> (Detection, Option<f64>) {
-        let mut detector = firing.start_detector();
+        let mut detector = start_detector(firing);
         let detection = match detector.next_rise(self.scan_start_us(ready_us)) {
             Some(first_us) => self.echoes(detector.as_mut(), first_us, latch),
             None => self.no_echo(detector.as_mut(), firing.arrivals),
@@ -179,5 +274,18 @@ impl Receiver {
             echoes_us,
             has_more_echoes: false,
         }
+    }
+}
+
+/// Status of a measured reading from its first time of flight, microseconds.
+///
+/// ECHO within one carrier cycle (20 us) of the end of blanking was raised by sound that was
+/// already present. A real echo that begins in that span is indistinguishable from it.
+#[must_use]
+pub fn classify_tof(tof_us: Option<f64>, blanking_us: f64) -> PingStatus {
+    match tof_us {
+        None => PingStatus::NoEcho,
+        Some(tof_us) if tof_us <= blanking_us + BLANKING_TOLERANCE_US => PingStatus::MinRange,
+        Some(_) => PingStatus::Echo,
     }
 }

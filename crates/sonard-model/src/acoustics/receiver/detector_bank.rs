@@ -1,8 +1,11 @@
 //! Detection of one firing at several thresholds.
 
 use super::{
-    Incident, PulseArrival, Receiver,
-    detector::{EchoDetector, Firing},
+    characteristics::{Incident, PulseArrival, Receiver},
+    detector::{
+        firing::{EchoDetector, Firing},
+        start_detector,
+    },
 };
 use crate::reading::PingStatus;
 
@@ -38,7 +41,7 @@ impl Receiver {
         incident: &'a dyn Fn(&PulseArrival) -> Option<Incident>,
     ) -> DetectorBank<'a> {
         let firing = Firing { known_m: length_m, ..Firing::new(self, arrivals, incident) };
-        DetectorBank { receiver: self, detector: firing.start_detector() }
+        DetectorBank { receiver: self, detector: start_detector(firing) }
     }
 }
 

@@ -6,7 +6,7 @@ use num_complex::Complex64;
 use rand::Rng;
 use rand_distr::{Distribution as _, StandardNormal};
 
-use super::Receiver;
+use super::characteristics::Receiver;
 use crate::acoustics::{Sensor, pulse::filter_sigma_us};
 
 /// Noise parameters of a receiver.

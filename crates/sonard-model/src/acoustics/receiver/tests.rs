@@ -4,10 +4,16 @@ mod carrier;
 mod noise;
 mod threshold;
 
+use std::f64::consts::TAU;
+
 use rand::{RngExt as _, SeedableRng as _};
 use rand_pcg::Pcg64;
 
 use super::*;
+use crate::{
+    acoustics::{Gain, Sensor},
+    reading::PingStatus,
+};
 
 /// At 340 m/s a path of 0.34 m takes 1000 us.
 const SPEED_M_S: f64 = 340.0;

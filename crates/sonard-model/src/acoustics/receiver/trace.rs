@@ -1,6 +1,10 @@
 //! Oscilloscope trace of a firing.
 
-use super::{Detection, Incident, Latch, PulseArrival, Receiver, detector::Firing};
+use super::{
+    characteristics::{Incident, PulseArrival, Receiver},
+    detection::{Detection, Latch},
+    detector::{firing::Firing, start_detector},
+};
 
 /// Signal of one firing versus time.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,7 +60,7 @@ impl Receiver {
     ) -> EchoTrace {
         let step_us = step_us.max(1.0);
         let count = (until_us.clamp(0.0, self.window_us()) / step_us) as usize;
-        let mut detector = Firing::new(self, arrivals, incident).start_detector();
+        let mut detector = start_detector(Firing::new(self, arrivals, incident));
         let mut peaks = vec![(0.0, 0.0); arrivals.len()];
         let points = (0..=count)
             .map(|i| {

@@ -1,7 +1,7 @@
 //! Images of a source by floor and ceiling.
 
 use super::ImageSourceError;
-use crate::{model::paths::mirror_gain, scene::Scene};
+use crate::scene::{Material, Scene};
 
 /// Floor and ceiling of a scene, if it has them.
 pub(super) struct FlatLimits {
@@ -40,8 +40,8 @@ impl HeightImage {
 impl FlatLimits {
     pub(super) fn new(scene: &Scene) -> Self {
         let walls = scene.walls.len() as u32;
-        let limit = |z_m: Option<f64>, material, surface| {
-            z_m.map(|z_m| FlatLimit { z_m, gain: mirror_gain(material), surface })
+        let limit = |z_m: Option<f64>, material: &Material, surface| {
+            z_m.map(|z_m| FlatLimit { z_m, gain: material.mirror_amplitude(), surface })
         };
         Self {
             levels: [

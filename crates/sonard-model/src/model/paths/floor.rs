@@ -19,7 +19,7 @@ pub(crate) use mesh::{Mesh, TriangleSide};
 pub(crate) use posts::extract_posts;
 pub(crate) use raised::Raised;
 pub(crate) use strips::extract_strips;
-pub(crate) use walls::{WallMirror, mirror_gain, scattered};
+pub(crate) use walls::WallMirror;
 
 use super::{
     effort::{Bound, Effort},

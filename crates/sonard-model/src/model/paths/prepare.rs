@@ -7,7 +7,7 @@ use super::{
     effort::{BOUND, Bound, Effort},
     floor::{
         Corners, Cylinders, Mesh, PlanCircle, Raised, TracingPlan, WallMirror, extract_posts,
-        extract_strips, mirror_gain, scattered,
+        extract_strips,
     },
     height::Heights,
     settings::{PathSettings, default_sensor_z_m},
@@ -72,12 +72,12 @@ fn plan(
     let is_there = |wall: u32| heights.is_relevant(scene.walls[wall as usize].z_m);
     let mut arrangement: Arrangement = drawn.restricted_to(is_there);
     let segments: &[(DVec2, DVec2)] = &drawn.walls;
-    let gains: Vec<_> = scene.walls.iter().map(|wall| mirror_gain(&wall.material)).collect();
+    let gains: Vec<_> = scene.walls.iter().map(|wall| wall.material.mirror_amplitude()).collect();
     let climbs = heights.climbs(&settings);
     let circle = |c: &Cylinder| PlanCircle {
         center: c.center,
         radius_m: if heights.is_relevant(c.z_m) { c.radius_m } else { 0.0 },
-        gain: mirror_gain(&c.material),
+        gain: c.material.mirror_amplitude(),
         is_opaque: heights.is_opaque(c.z_m),
     };
     let mut circles: Vec<PlanCircle> = scene.cylinders.iter().map(circle).collect();
@@ -102,7 +102,7 @@ fn plan(
             rotor: mirror.rotor(),
             gain,
             loss_m: settings.same_loss_m(gain),
-            scatter: scattered(&scene.walls[number].material),
+            scatter: scene.walls[number].material.scattered_energy(),
             z_m: scene.walls[number].z_m,
         }
     };

@@ -252,10 +252,7 @@ fn share(wall_mirror: &WallMirror, cosine: f64, angle_rad: f64, settings: &PathS
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        model::paths::floor::{mirror_gain, scattered},
-        scene::Material,
-    };
+    use crate::scene::Material;
 
     #[test]
     fn patches_are_small_and_contiguous() {
@@ -276,13 +273,13 @@ mod tests {
     fn energy_is_conserved() {
         for (reflectance, roughness) in [(1.0, 0.3), (0.9, 1.0), (0.7, 0.0)] {
             let material = Material { reflectance, roughness };
-            let mirrored = mirror_gain(&material).powi(2);
+            let mirrored = material.mirror_amplitude().powi(2);
             let steps = 100_000;
             let lobe: f64 = (0..steps)
                 .map(|i| (f64::from(i) + 0.5) / f64::from(steps) * PI / 2.0)
                 .map(|b| b.cos() / PI * TAU * b.sin() * PI / 2.0 / f64::from(steps))
                 .sum();
-            let scattered = scattered(&material) * lobe;
+            let scattered = material.scattered_energy() * lobe;
             assert!((mirrored + scattered - reflectance * reflectance).abs() < 1e-9);
         }
     }

@@ -8,14 +8,14 @@ use std::marker::PhantomData;
 use num_complex::Complex64;
 
 use super::{
-    EchoDetector, Firing, WINDOW_SLACK_US,
+    firing::{EchoDetector, Firing, WINDOW_SLACK_US},
     pulse::ActivePulse,
     pulse_track::PulseTrack,
     sum::Summation,
     threshold::EffectiveThreshold,
     timing::{EchoTiming, timing_for},
 };
-use crate::{acoustics::PulseArrival, reading::PingStatus};
+use crate::{acoustics::receiver::characteristics::PulseArrival, reading::PingStatus};
 
 /// Maximum relative amplitude of neighbouring arrivals that are neglected.
 const NEGLIGIBLE: f64 = 3e-3;

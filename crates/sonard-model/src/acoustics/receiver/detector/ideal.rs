@@ -1,7 +1,11 @@
 //! Ideal detector: separate arrivals, the wide-band limit.
 
-use super::{EchoDetector, Firing, WINDOW_SLACK_US, pulse_track::PulseTrack, sum::modulus};
-use crate::acoustics::PulseArrival;
+use super::{
+    firing::{EchoDetector, Firing, WINDOW_SLACK_US},
+    pulse_track::PulseTrack,
+    sum::modulus,
+};
+use crate::acoustics::receiver::characteristics::PulseArrival;
 
 /// Detector to which each arrival is a separate pulse of full strength, from its nominal time on
 /// and for the nominal pulse length.

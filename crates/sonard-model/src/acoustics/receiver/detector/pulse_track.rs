@@ -5,11 +5,11 @@
 use num_complex::Complex64;
 
 use super::{
-    Firing,
+    firing::Firing,
     pulse::{ActivePulse, PulseSize},
     sum::modulus,
 };
-use crate::acoustics::{EchoShape, Gain, receiver::Incident};
+use crate::acoustics::{EchoShape, Gain, receiver::characteristics::Incident};
 
 /// Arrivals of a firing as pulses, with the set of those in progress.
 pub(super) struct PulseTrack<'a> {

@@ -1,8 +1,8 @@
 //! Search for the time at which the envelope has exceeded the threshold for the integration time.
 
 use super::{
-    EchoDetector as _, WINDOW_SLACK_US,
     envelope::{EnvelopeDetector, IsolatedPulse},
+    firing::{EchoDetector as _, WINDOW_SLACK_US},
     pulse::ActivePulse,
     sum::Summation,
 };

@@ -4,7 +4,7 @@ use num_complex::Complex64;
 
 /// Rule by which overlapping pulses add up to an envelope.
 pub(super) trait Summation {
-    /// Whether the sum has a carrier phase.
+    /// The sum has a carrier phase.
     const HAS_PHASE: bool;
 
     /// Envelope of the sum of complex amplitudes, which is amplified by `gain`, and noise.

@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use super::super::{Receiver, gain::GainInterval};
+use super::super::{characteristics::Receiver, gain::GainInterval};
 
 /// Effective threshold as a function of time, with a factor, for queries of increasing time.
 pub(super) struct EffectiveThreshold<'a> {

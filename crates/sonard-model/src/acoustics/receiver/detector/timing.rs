@@ -1,6 +1,6 @@
 //! Timing policies: the instant at which ECHO rises after the envelope has crossed the threshold.
 
-use crate::acoustics::{Detector, Receiver};
+use crate::acoustics::{Detector, receiver::characteristics::Receiver};
 
 /// Timing policy of an envelope detector.
 pub(super) trait EchoTiming {

@@ -22,7 +22,7 @@ pub(crate) struct PlanCircle {
     /// Zero for a cylinder that is not at the ranger's height, so that the others keep their
     /// numbers.
     pub(crate) radius_m: f64,
-    /// See [`super::mirror_gain`].
+    /// Amplitude of the mirror reflection.
     pub(crate) gain: f64,
     /// `true` if no sound passes above or below.
     pub(crate) is_opaque: bool,

@@ -35,7 +35,7 @@ pub(crate) struct VerticalImage {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct HorizontalMirror {
     pub(crate) z_m: f64,
-    /// See [`mirror_gain`](crate::model::paths::floor::mirror_gain).
+    /// Amplitude of the mirror reflection.
     pub(crate) gain: f64,
 }
 

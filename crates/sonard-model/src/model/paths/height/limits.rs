@@ -19,7 +19,7 @@ use crate::{
     model::{
         Reflector,
         paths::{
-            floor::{Climbs, Spans, WallClimbs, mirror_gain, united},
+            floor::{Climbs, Spans, WallClimbs, united},
             settings::PathSettings,
             tolerance::TIE_M,
         },
@@ -305,7 +305,7 @@ impl Heights {
 
 /// Floor or ceiling as a mirror, if there is one.
 fn mirror(z_m: Option<f64>, material: &Material) -> Option<HorizontalMirror> {
-    Some(HorizontalMirror { z_m: z_m?, gain: mirror_gain(material) })
+    Some(HorizontalMirror { z_m: z_m?, gain: material.mirror_amplitude() })
 }
 
 /// A reflection at floor or ceiling.
