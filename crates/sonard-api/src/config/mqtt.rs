@@ -127,13 +127,21 @@ const fn is_name_byte(byte: u8) -> bool {
 }
 
 impl MqttKeys {
-    /// Checks rules beyond ranges. `built_in` is `true` if the program was built with MQTT support.
+    /// Checks rules beyond ranges; at last, whether the program was built with MQTT support
+    /// (`built_in`).
     /// Without a broker every setting is valid.
     ///
     /// # Errors
     /// First invalid key.
     pub fn check(&self, built_in: bool) -> Result<(), Fault> {
         let Some(url) = &self.broker else { return Ok(()) };
+        let broker = BrokerAddress::parse(url)
+            .map_err(|help| ("broker", format!("mqtt.broker is {url}"), help))?;
+        if !is_prefix(&self.topic) {
+            let help = "names separated by /, without +, # and spaces: sonard, or plant/sonard";
+            return Err(("topic", format!("mqtt.topic is {:?}", self.topic), help.into()));
+        }
+        self.check_secrets(&broker)?;
         if !built_in {
             let help =
                 "build it with `cargo build --release --features mqtt`, or remove mqtt.broker";
@@ -143,13 +151,7 @@ impl MqttKeys {
                 help.into(),
             ));
         }
-        let broker = BrokerAddress::parse(url)
-            .map_err(|help| ("broker", format!("mqtt.broker is {url}"), help))?;
-        if !is_prefix(&self.topic) {
-            let help = "names separated by /, without +, # and spaces: sonard, or plant/sonard";
-            return Err(("topic", format!("mqtt.topic is {:?}", self.topic), help.into()));
-        }
-        self.check_secrets(&broker)
+        Ok(())
     }
 
     fn check_secrets(&self, broker: &BrokerAddress) -> Result<(), Fault> {

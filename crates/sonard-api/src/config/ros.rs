@@ -113,7 +113,8 @@ impl RosKeys {
         }
     }
 
-    /// Checks rules beyond ranges. `built_in` is `true` if the program was built with DDS support.
+    /// Checks rules beyond ranges; at last, whether the program was built with DDS support
+    /// (`built_in`).
     /// If the output is disabled, every setting is valid.
     ///
     /// # Errors
@@ -121,12 +122,6 @@ impl RosKeys {
     pub fn check(&self, built_in: bool) -> Result<(), Fault> {
         if !self.enabled {
             return Ok(());
-        }
-        if !built_in {
-            let message = "this program was built without the feature ros";
-            let help =
-                "build it with `cargo build --release --features ros`, or set ros.enabled = false";
-            return Err(("enabled", message.into(), help.into()));
         }
         if !is_namespace(&self.namespace) {
             let help = "expected names of letters, digits and _, each after a slash: /kiwi, or /lab/kiwi_7";
@@ -147,6 +142,12 @@ impl RosKeys {
         if self.networks.is_empty() {
             let help = "use [\"127.0.0.1\"] for this computer only; to disable the output, set ros.enabled = false";
             return Err(("networks", "ros.networks is empty".into(), help.into()));
+        }
+        if !built_in {
+            let message = "this program was built without the feature ros";
+            let help =
+                "build it with `cargo build --release --features ros`, or set ros.enabled = false";
+            return Err(("enabled", message.into(), help.into()));
         }
         Ok(())
     }
