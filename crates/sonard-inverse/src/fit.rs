@@ -6,19 +6,21 @@ mod lm_step;
 mod local;
 mod multistart;
 mod perturbation;
+mod problem;
 mod profile;
 mod refine;
 mod scale;
+#[cfg(test)]
+mod tests;
 
-use std::{rc::Rc, slice};
+use std::{cell::RefCell, rc::Rc, slice};
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
-use sonard_model::geometry::{Pose, wrap_180};
+use sonard_model::geometry::Pose;
 use thiserror::Error;
 
 use crate::{
-    candidates::Phases,
     jacobian::JacobianBuilder,
     likelihood::ErrorModel,
     linear::LinearizedModel,
@@ -30,6 +32,7 @@ use crate::{
 pub use checkpoint::SearchResult;
 pub use local::fit_from;
 pub(crate) use local::{RoughFit, approach, fit_near};
+use problem::{Point, Problem};
 
 /// Parameter to fit, with its prior.
 #[derive(Debug, Clone, PartialEq)]
@@ -144,36 +147,25 @@ pub(crate) fn one_of_many<T>(result: Result<T, FitError>) -> Result<Option<T>, F
     }
 }
 
-/// State of a running fit.
+/// Evaluation of a problem's posterior, whose stages each map values to values.
 struct Fitter<'a> {
-    fit: &'a FitOptions,
-    watch: &'a dyn FitObserver,
+    problem: Problem<'a>,
+    observer: &'a dyn FitObserver,
     /// Recorded results of the next searches, when resumed.
-    known: slice::Iter<'a, SearchResult>,
-    start: &'a World,
-    sweeps: &'a [FitSweep],
-    parameters: Vec<&'a Parameter>,
-    /// Changes since the start.
-    values: DVector<f64>,
-    /// Simulators of the current world, with the transducer on the axis.
-    models: SimulatorSet,
-    phases: Phases,
-    /// Whether predictions use the actual transducer position instead of the axis.
-    is_exact: bool,
-    /// Linear combination of the parameters held constant by steps.
-    held: Option<DVector<f64>>,
+    recorded: RefCell<slice::Iter<'a, SearchResult>>,
+    /// Simulators of the last world, with the transducer on the axis: those that the next one does
+    /// not change are reused.
+    simulators: RefCell<SimulatorSet>,
     /// Most recent linearization and its point.
-    last: Option<(DVector<f64>, Phases, Rc<LinearizedModel>)>,
+    last: RefCell<Option<(Point, Rc<LinearizedModel>)>>,
 }
 
 /// Optimum of a fit, with known or unknown phases.
 struct Optimum {
     /// Log-posterior.
     value: f64,
-    /// Changes since the start.
-    values: DVector<f64>,
+    point: Point,
     errors: ErrorModel,
-    phases: Phases,
 }
 
 /// Standard deviation of a threshold that is not fitted, decibels.
@@ -183,7 +175,7 @@ const NOT_FITTED_DB: f64 = 0.5;
 ///
 /// Maximizes the posterior by Levenberg-Marquardt steps on a linearization of all candidate
 /// readings, with new predictions after each set of steps. The error model is annealed from
-/// `widest_m` to the observed scatter. Arrivals first add by power, because a pose error of a tenth
+/// `initial_sigma_m` to the observed scatter. Arrivals first add by power, because a pose error of a tenth
 /// of a wavelength changes the phases; at the end coherently, if that is likelier.
 ///
 /// # Errors
@@ -205,11 +197,11 @@ pub fn fit_observed(
     known: &[SearchResult],
     watch: &dyn FitObserver,
 ) -> Result<FitResult, FitError> {
-    let models = SimulatorSet::new(&world.with_face_on_axis())?;
-    let mut fitter = Fitter::new(models, world, sweeps, fit, watch)?;
-    fitter.known = known.iter();
-    let (best, beside) = fitter.likeliest()?;
-    fitter.end(best, &beside)
+    let simulators = SimulatorSet::new(&world.with_face_on_axis())?;
+    let problem = Problem::new(world, sweeps, fit)?;
+    let fitter = Fitter::new(problem, simulators, watch).resume(known);
+    let (best, other_variances) = fitter.find_optimum()?;
+    fitter.report(best, &other_variances)
 }
 
 /// Cramer-Rao bounds on the standard deviations of unbiased estimates, including the priors.
@@ -223,170 +215,115 @@ pub fn cramer_rao_bound(
     fit: &FitOptions,
     errors: &ErrorModel,
 ) -> Result<Vec<f64>, FitError> {
-    let models = SimulatorSet::new(&world.with_face_on_axis())?;
-    let mut fitter = Fitter::new(models, world, sweeps, fit, &NoObserver)?;
-    fitter.phases = Phases::Known;
-    fitter.be_exact();
-    let curve = fitter.linear()?.curve(&fitter.still(), errors);
-    let covariance = fitter.covariance(curve.information).ok_or(FitError::Degenerate)?;
+    let simulators = SimulatorSet::new(&world.with_face_on_axis())?;
+    let fitter = Fitter::new(Problem::new(world, sweeps, fit)?, simulators, &NoObserver);
+    let point = Point { is_exact: true, ..Point::coherent(fitter.problem.zero()) };
+    let curve = fitter.linearize(&point)?.curve(&fitter.problem.zero(), errors);
+    let covariance = fitter.problem.covariance(curve.information)?;
     Ok((0..fit.priors.len()).map(|at| covariance[(at, at)].sqrt()).collect())
 }
 
 impl<'a> Fitter<'a> {
-    fn new(
-        models: SimulatorSet,
-        start: &'a World,
-        sweeps: &'a [FitSweep],
-        fit: &'a FitOptions,
-        watch: &'a dyn FitObserver,
-    ) -> Result<Self, FitError> {
-        if fit.priors.is_empty() || sweeps.is_empty() {
-            return Err(FitError::Nothing);
+    fn new(problem: Problem<'a>, simulators: SimulatorSet, observer: &'a dyn FitObserver) -> Self {
+        Self {
+            problem,
+            observer,
+            recorded: RefCell::new([].iter()),
+            simulators: RefCell::new(simulators),
+            last: RefCell::new(None),
         }
-        let parameters = fit.priors.iter().map(|prior| &prior.parameter).collect();
-        let values = DVector::zeros(fit.priors.len());
-        Ok(Self {
-            fit,
-            watch,
-            known: [].iter(),
-            start,
-            sweeps,
-            parameters,
-            values,
-            models,
-            phases: Phases::Unknown,
-            is_exact: false,
-            held: None,
-            last: None,
-        })
     }
 
-    fn rough_errors(&self) -> ErrorModel {
-        let World { options, sensor, .. } = self.start;
-        let reach_m = options.max_range_m.unwrap_or(sensor.max_range_m);
-        let errors =
-            ErrorModel::rough(self.fit.initial_sigma_m, continuation::STAGES[0].1, reach_m);
-        if self.fit.search == Search::Furnished { errors } else { errors.without_arcs() }
+    /// Replays recorded results before new searches.
+    fn resume(self, recorded: &'a [SearchResult]) -> Self {
+        Self { recorded: RefCell::new(recorded.iter()), ..self }
     }
 
-    /// Minimum standard deviation of ranges, metres; at least that of their quantization.
-    fn least_sigma_m(&self) -> f64 {
-        self.fit.min_sigma_m.max(self.start.sensor.range_step_m / 12f64.sqrt())
-    }
-
-    fn covariance(&self, mut information: DMatrix<f64>) -> Option<DMatrix<f64>> {
-        for at in 0..self.parameters.len() {
-            information[(at, at)] += self.precision(at);
-        }
-        Some(Cholesky::new(information)?.inverse())
-    }
-
-    fn still(&self) -> DVector<f64> {
-        DVector::zeros(self.parameters.len())
-    }
-
-    fn changes(&self, values: &DVector<f64>) -> Vec<(&Parameter, f64)> {
-        self.parameters.iter().copied().zip(values.iter().copied()).collect()
-    }
-
-    fn poses(&self) -> Vec<Pose> {
-        let mut poses: Vec<Pose> = self.sweeps.iter().map(|sweep| sweep.pose).collect();
-        for (parameter, &by) in self.parameters.iter().zip(&self.values) {
-            match parameter {
-                Parameter::X(sweep) => poses[*sweep].x_m += by,
-                Parameter::Y(sweep) => poses[*sweep].y_m += by,
-                Parameter::Heading(sweep) => {
-                    poses[*sweep].heading_deg = wrap_180(poses[*sweep].heading_deg + by);
-                }
-                _ => {}
-            }
-        }
-        poses
-    }
-
-    fn world(&self) -> Result<World, WorldError> {
-        self.start.changed(&self.changes(&self.values))
-    }
-
-    /// Linearization at the current values, with the transducer on the axis unless exact.
-    fn linear(&mut self) -> Result<Rc<LinearizedModel>, FitError> {
-        if let Some((values, phases, linear)) = &self.last
-            && (values, *phases) == (&self.values, self.phases)
+    /// Linearization of all candidate readings about a point.
+    ///
+    /// # Errors
+    /// Invalid world, or cancelled.
+    fn linearize(&self, point: &Point) -> Result<Rc<LinearizedModel>, FitError> {
+        if let Some((at, linear)) = &*self.last.borrow()
+            && at == point
         {
             return Ok(Rc::clone(linear));
         }
-        let world = self.moved_world()?;
-        let linear = if self.is_exact {
-            self.about(&self.models.changed_to(&world)?, &world)?
+        let world = self.move_world(&point.values)?;
+        let linear = if point.is_exact {
+            let simulators = self.simulators.borrow().changed_to(&world)?;
+            self.linearize_with(&simulators, &world, point)?
         } else {
-            self.about(&self.models, &world)?
+            self.linearize_with(&self.simulators.borrow(), &world, point)?
         };
         let linear = Rc::new(linear);
-        self.last = Some((self.values.clone(), self.phases, Rc::clone(&linear)));
+        self.last.replace(Some((point.clone(), Rc::clone(&linear))));
         Ok(linear)
     }
 
-    /// Switches to predictions with the actual transducer position.
-    fn be_exact(&mut self) {
-        (self.is_exact, self.last) = (true, None);
+    fn linearize_with(
+        &self,
+        simulators: &SimulatorSet,
+        world: &World,
+        point: &Point,
+    ) -> Result<LinearizedModel, FitError> {
+        let Problem { start, parameters, sweeps, .. } = &self.problem;
+        let reference_m_s = start.air.sound_speed_m_s();
+        let jacobian = JacobianBuilder::new(world, parameters, reference_m_s, point.phases);
+        let poses = self.problem.poses(&point.values);
+        Ok(LinearizedModel::about(simulators, &jacobian, sweeps, &poses)?)
     }
 
-    fn about(&self, models: &SimulatorSet, world: &World) -> Result<LinearizedModel, FitError> {
-        let reference_m_s = self.start.air.sound_speed_m_s();
-        let rates = JacobianBuilder::new(world, &self.parameters, reference_m_s, self.phases);
-        Ok(LinearizedModel::about(models, &rates, self.sweeps, &self.poses())?)
-    }
-
-    /// World at the current values, with updated simulators; called before each prediction.
-    fn moved_world(&mut self) -> Result<World, FitError> {
-        if self.watch.is_cancelled() {
+    /// World with the parameters changed, for which the simulators are updated.
+    ///
+    /// # Errors
+    /// Invalid world, or cancelled.
+    fn move_world(&self, values: &DVector<f64>) -> Result<World, FitError> {
+        if self.observer.is_cancelled() {
             return Err(FitError::Stopped);
         }
-        let world = self.world()?;
-        self.models = self.models.changed_to(&world.with_face_on_axis())?;
+        let world = self.problem.world(values)?;
+        let simulators = self.simulators.borrow().changed_to(&world.with_face_on_axis())?;
+        self.simulators.replace(simulators);
         Ok(world)
     }
 
-    fn precision(&self, at: usize) -> f64 {
-        self.fit.priors[at].sigma.powi(-2)
+    /// Log-posterior at the point of a linearization.
+    fn log_posterior(&self, linear: &LinearizedModel, point: &Point, errors: &ErrorModel) -> f64 {
+        linear.log_likelihood(&self.problem.zero(), errors) + self.problem.log_prior(&point.values)
     }
 
-    fn log_prior(&self, values: &DVector<f64>) -> f64 {
-        let of = |(at, value): (usize, &f64)| -0.5 * self.precision(at) * value * value;
-        values.iter().enumerate().map(of).sum()
-    }
-
-    /// Result at an optimum; other optima add `beside` to the variances.
-    fn end(mut self, best: Optimum, beside: &DVector<f64>) -> Result<FitResult, FitError> {
-        let Optimum { values, phases, errors, .. } = self.exactly(best)?;
-        (self.values, self.phases) = (values, phases);
-        let linear = self.linear()?;
-        let curve = linear.curve(&self.still(), &errors.for_information());
-        let mut covariance =
-            self.covariance(curve.information.clone()).ok_or(FitError::Degenerate)?;
-        let log_likelihood = linear.log_likelihood(&self.still(), &errors);
+    /// Result at an optimum, by the Laplace approximation; other optima add `other_variances`.
+    fn report(&self, best: Optimum, other_variances: &DVector<f64>) -> Result<FitResult, FitError> {
+        let Optimum { point, errors, .. } = self.predict_exactly(best)?;
+        let (problem, zero) = (&self.problem, self.problem.zero());
+        let linear = self.linearize(&point)?;
+        let curve = linear.curve(&zero, &errors.for_information());
+        let mut covariance = problem.covariance(curve.information.clone())?;
+        let log_likelihood = linear.log_likelihood(&zero, &errors);
         // Ranges depend on the threshold by time walk; if not in the Jacobian, its uncertainty is
         // added.
-        let threshold = self.parameters.iter().position(|of| **of == Parameter::Threshold);
-        let is_in_rates = threshold.is_some() && linear.is_walk_believed(&errors);
-        if !is_in_rates {
+        let threshold = problem.index_of(&Parameter::Threshold);
+        let is_in_jacobian = threshold.is_some() && linear.is_walk_believed(&errors);
+        if !is_in_jacobian {
             let sigma_db = threshold.map_or(NOT_FITTED_DB, |at| covariance[(at, at)].sqrt());
             let moved = &covariance * &curve.walk * sigma_db;
             covariance += &moved * moved.transpose();
         }
-        let estimates = self.values.iter().enumerate().map(|(at, &change)| {
-            let sigma = (covariance[(at, at)] + beside[at]).max(0.0).sqrt();
-            ParameterEstimate { change, sigma, identified: sigma < 0.5 * self.fit.priors[at].sigma }
+        let estimates = point.values.iter().enumerate().map(|(at, &change)| {
+            let sigma = (covariance[(at, at)] + other_variances[at]).max(0.0).sqrt();
+            let identified = sigma < 0.5 * problem.options.priors[at].sigma;
+            ParameterEstimate { change, sigma, identified }
         });
         Ok(FitResult {
             estimates: estimates.collect(),
             covariance,
-            world: self.world()?,
-            poses: self.poses(),
+            world: problem.world(&point.values)?,
+            poses: problem.poses(&point.values),
             errors,
             log_likelihood,
             readings: linear.len(),
-            log_posterior: log_likelihood + self.log_prior(&self.values),
+            log_posterior: log_likelihood + problem.log_prior(&point.values),
         })
     }
 }

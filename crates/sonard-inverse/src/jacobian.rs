@@ -15,7 +15,7 @@ use sonard_model::{
     model::{
         Arrival, Mechanism, ObservationPoint, Path, Reflector, Simulator, TooCostly, receiver,
     },
-    scene::Scene,
+    scene::{MaterialProperty, Scene},
 };
 
 use self::{
@@ -348,18 +348,13 @@ fn time_walk(receiver: &Receiver, world: &World, stretch: f64) -> TimeWalk {
 
 /// Derivative of the level of a path by a parameter of a material, decibels per unit; 0 for others.
 pub(crate) fn material_rate_db(parameter: &Parameter, scene: &Scene, path: &Path) -> f64 {
-    /// Minimum fraction for the derivative: near zero, a small change is many decibels.
-    const MIN_SHARE: f64 = 0.02;
-    let (Parameter::Reflectance(name) | Parameter::Roughness(name)) = parameter else { return 0.0 };
-    let Some(material) = scene.materials.get(name) else { return 0.0 };
-    let [by_mirror, by_scattering] = match parameter {
-        // Both share the energy; amplitudes are square roots.
-        Parameter::Roughness(_) => {
-            let scattered = material.roughness;
-            [-0.5 / (1.0 - scattered).max(MIN_SHARE), 0.5 / scattered.max(MIN_SHARE)]
-        }
-        _ => [1.0, 1.0],
+    let (name, property) = match parameter {
+        Parameter::Reflectance(name) => (name, MaterialProperty::LogReflectance),
+        Parameter::Roughness(name) => (name, MaterialProperty::Roughness),
+        _ => return 0.0,
     };
+    let Some(material) = scene.materials.get(name) else { return 0.0 };
+    let [by_mirror, by_scattering] = material.log_amplitude_rates(property);
     let of_wall = |wall: u32| scene.walls.get(wall as usize).map(|wall| wall.material);
     let rate = |mechanism: Mechanism| {
         let (of, rate) = match mechanism {

@@ -12,6 +12,8 @@ mod near;
 mod recovery;
 mod thresholds;
 
+pub(crate) use checkpoint::{PLACE, short};
+
 use std::sync::Arc;
 
 use sonard_model::{

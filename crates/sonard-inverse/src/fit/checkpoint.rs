@@ -55,21 +55,24 @@ impl SearchResult {
 
 impl Fitter<'_> {
     /// Runs the next search, or replays its recorded result.
-    pub(super) fn found(
-        &mut self,
-        search: impl FnOnce(&mut Self) -> Result<SearchResult, FitError>,
+    pub(super) fn run_or_replay(
+        &self,
+        search: impl FnOnce() -> Result<SearchResult, FitError>,
     ) -> Result<SearchResult, FitError> {
-        match self.known.next() {
+        let recorded = self.recorded.borrow_mut().next();
+        match recorded {
             // A recorded failure is repeated to obtain its error.
-            Some(SearchResult::Nothing) => search(self),
-            Some(found) if found.values().len() == self.parameters.len() => Ok(found.clone()),
+            Some(SearchResult::Nothing) => search(),
+            Some(found) if found.values().len() == self.problem.parameters.len() => {
+                Ok(found.clone())
+            }
             Some(_) => Err(FitError::OtherFit),
             None => {
-                let found = search(self);
+                let found = search();
                 match &found {
-                    Ok(found) => self.watch.found(found),
+                    Ok(found) => self.observer.found(found),
                     Err(error) if error.ends_all() => {}
-                    Err(_) => self.watch.found(&SearchResult::Nothing),
+                    Err(_) => self.observer.found(&SearchResult::Nothing),
                 }
                 found
             }

@@ -3,8 +3,9 @@
 use nalgebra::DVector;
 
 use super::{
-    FitError, Fitter, Optimum, Search,
+    FitError, Fitter, Optimum, Point, Search,
     checkpoint::{SearchResult, listed},
+    lm_step::Improved,
     one_of_many,
 };
 use crate::{
@@ -27,159 +28,141 @@ const MIN_GAIN: f64 = 1e-3;
 /// Rotations tried at each stage: step in degrees, and number on either side.
 const TURNS: [(f64, i32); STAGES.len()] = [(1.5, 8), (1.5, 8), (1.0, 10), (0.75, 12), (0.5, 10)];
 
-/// Range error in wavelengths above which phases carry no information.
-const MISSED: f64 = 0.5;
-
 impl Fitter<'_> {
-    /// Runs some stages of the continuation.
-    pub(super) fn approach(
-        &mut self,
-        errors: &mut ErrorModel,
+    /// Runs some stages of the continuation from a point and an error model.
+    pub(super) fn run_continuation(
+        &self,
+        mut point: Point,
+        mut errors: ErrorModel,
         stages: impl Iterator<Item = usize>,
-    ) -> Result<(), FitError> {
+    ) -> Result<(Point, ErrorModel), FitError> {
         for stage in stages {
-            let from = *errors;
-            let found = self.found(|fitter| fitter.narrowed(from, stage))?;
+            let found = self.run_or_replay(|| self.run_stage(&point, errors, stage))?;
             let SearchResult::Spread { values, errors: narrowed, is_last } = found else {
                 return Err(FitError::OtherFit);
             };
-            (self.values, *errors) = (DVector::from_vec(values), narrowed);
+            (point, errors) = (point.moved_to(DVector::from_vec(values)), narrowed);
             if is_last {
                 break;
             }
         }
-        Ok(())
+        Ok((point, errors))
     }
 
     /// Runs one stage.
-    fn narrowed(&mut self, mut errors: ErrorModel, stage: usize) -> Result<SearchResult, FitError> {
+    fn run_stage(
+        &self,
+        from: &Point,
+        mut errors: ErrorModel,
+        stage: usize,
+    ) -> Result<SearchResult, FitError> {
+        let options = self.problem.options;
         let ((share, sigma_db), (step_deg, steps)) = (STAGES[stage], TURNS[stage]);
-        self.watch.progress(FitProgress::Continuation { stage: stage + 1, of: STAGES.len() });
-        let steps = steps.min((self.fit.max_turn_deg / step_deg) as i32);
+        self.observer.progress(FitProgress::Continuation { stage: stage + 1, of: STAGES.len() });
+        let steps = steps.min((options.max_turn_deg / step_deg) as i32);
         // Never narrower than the observed scatter: otherwise a few readings that happen to agree
         // would dominate, and all others count as clutter.
-        let linear = self.linear()?;
-        let spread = self.spread(&linear, &errors);
-        errors.sigma_m = (self.fit.initial_sigma_m * share).max(spread.sigma_m.min(errors.sigma_m));
-        errors.sigma_db = sigma_db.max(self.fit.min_sigma_db);
-        let is_turned = self.turn(&errors, step_deg, steps)?;
-        let mut moved = f64::INFINITY;
+        let scatter = self.estimate_errors(&*self.linearize(from)?, &errors);
+        errors.sigma_m = (options.initial_sigma_m * share).max(scatter.sigma_m.min(errors.sigma_m));
+        errors.sigma_db = sigma_db.max(options.min_sigma_db);
+        let turns = self.turn(from, &errors, step_deg, steps)?;
+        let mut point = from.moved_to(&from.values + &turns);
+        let mut largest = f64::INFINITY;
         for _ in 0..3 {
-            let linear = self.linear()?;
-            moved = self.improve(&linear, &errors)?;
-            if moved < 0.2 {
+            let linear = self.linearize(&point)?;
+            Improved { point, largest } = self.improve(&linear, &point, &errors, None)?;
+            if largest < 0.2 {
                 break;
             }
         }
         // The observed scatter is reached and nothing moves: narrower stages change nothing.
-        let is_last =
-            !is_turned && moved < 0.02 && errors.sigma_m > self.fit.initial_sigma_m * share;
-        Ok(SearchResult::Spread { values: listed(&self.values), errors, is_last })
-    }
-
-    /// Log-posterior at the current values.
-    pub(super) fn value(&self, linear: &LinearizedModel, errors: &ErrorModel) -> f64 {
-        linear.log_likelihood(&self.still(), errors) + self.log_prior(&self.values)
+        let is_last = turns.amax() == 0.0
+            && largest < 0.02
+            && errors.sigma_m > options.initial_sigma_m * share;
+        Ok(SearchResult::Spread { values: listed(&point.values), errors, is_last })
     }
 
     /// Converges without phases, and with them if ranges allow it; returns the likelier optimum.
-    pub(super) fn settle(&mut self, errors: ErrorModel) -> Result<Optimum, FitError> {
-        let without = self.settled(errors)?;
-        self.with_phases(without)
-    }
-
-    /// Returns `true` if ranges are too uncertain for phases, as in a room measured with a tape.
-    pub(super) fn is_beyond_phases(&self, errors: &ErrorModel) -> bool {
-        self.missed_wavelengths(errors) > MISSED
-    }
-
-    /// Range error in wavelengths.
-    pub(super) fn missed_wavelengths(&self, errors: &ErrorModel) -> f64 {
-        errors.sigma_m * self.start.sensor.frequency_hz / self.start.air.sound_speed_m_s()
+    pub(super) fn settle(&self, from: &Point, errors: ErrorModel) -> Result<Optimum, FitError> {
+        self.try_phases(self.converge(from, errors)?)
     }
 
     /// Likelier of an optimum without phases and the one with phases that follows from it.
-    pub(super) fn with_phases(&mut self, without: Optimum) -> Result<Optimum, FitError> {
-        if self.is_beyond_phases(&without.errors) {
+    pub(super) fn try_phases(&self, without: Optimum) -> Result<Optimum, FitError> {
+        if self.problem.is_beyond_phases(&without.errors) {
             return Ok(without);
         }
-        (self.values, self.phases) = (without.values.clone(), Phases::Known);
-        let with = self.settled(without.errors)?;
+        let with = self.converge(&without.point.with_phases(Phases::Known), without.errors)?;
         Ok(if with.value > without.value { with } else { without })
     }
 
     /// Alternates between error model and values until the log-posterior converges.
-    pub(super) fn settled(&mut self, from: ErrorModel) -> Result<Optimum, FitError> {
-        let phases = self.phases;
-        match self.found(|fitter| fitter.likeliest_here(from))? {
+    pub(super) fn converge(&self, from: &Point, errors: ErrorModel) -> Result<Optimum, FitError> {
+        match self.run_or_replay(|| self.run_steps(from, errors))? {
             SearchResult::End { values, errors, log_posterior } => Ok(Optimum {
                 value: log_posterior,
-                values: DVector::from_vec(values),
+                point: from.moved_to(DVector::from_vec(values)),
                 errors,
-                phases,
             }),
             _ => Err(FitError::OtherFit),
         }
     }
 
     /// Repeats an on-axis optimum with exact predictions: a thorough search refines it, a quick one
-    /// makes one step. All later predictions are exact as well.
-    pub(super) fn exactly(&mut self, end: Optimum) -> Result<Optimum, FitError> {
-        (self.values, self.phases) = (end.values.clone(), end.phases);
+    /// makes one step.
+    pub(super) fn predict_exactly(&self, optimum: Optimum) -> Result<Optimum, FitError> {
         // The mounting may have changed since the start.
-        if self.world()?.sensor.mounting.is_on_axis() {
-            return Ok(end);
+        if self.problem.world(&optimum.point.values)?.sensor.mounting.is_on_axis() {
+            return Ok(optimum);
         }
-        self.be_exact();
-        if self.fit.search == Search::Quick {
-            let exact = self.linear()?;
-            self.improve(&exact, &end.errors)?;
-            return Ok(Optimum { values: self.values.clone(), ..end });
+        let point = Point { is_exact: true, ..optimum.point.clone() };
+        if self.problem.options.search == Search::Quick {
+            let linear = self.linearize(&point)?;
+            let Improved { point, .. } = self.improve(&linear, &point, &optimum.errors, None)?;
+            return Ok(Optimum { point, ..optimum });
         }
-        let settled = self.settled(end.errors)?;
-        self.polished(settled)
+        self.refine(self.converge(&point, optimum.errors)?)
     }
 
-    fn likeliest_here(&mut self, from: ErrorModel) -> Result<SearchResult, FitError> {
-        let linear = self.linear()?;
-        let mut errors = self.spread(&linear, &from);
-        let mut best = (self.value(&linear, &errors), self.values.clone());
-        let mut step = self.step_from(&linear, &errors)?;
+    fn run_steps(&self, from: &Point, errors: ErrorModel) -> Result<SearchResult, FitError> {
+        let linear = self.linearize(from)?;
+        let mut errors = self.estimate_errors(&linear, &errors);
+        let mut best = (self.log_posterior(&linear, from, &errors), from.clone());
+        let mut step = self.step_from(&linear, from, &errors)?;
         for number in 0..LAST_STEPS {
             // Without phases the optimum is preliminary: with them another point is likelier.
-            let is_final = self.is_beyond_phases(&errors);
+            let is_final = self.problem.is_beyond_phases(&errors);
             if number >= FIRST_STEPS && !is_final {
                 break;
             }
-            self.values = self.limited(&best.1 + &step);
+            let next = best.1.moved_to(self.problem.limited(&best.1.values + &step));
             // Prediction may fail, as within a wall.
-            let linear = one_of_many(self.linear())?;
+            let linear = one_of_many(self.linearize(&next))?;
             let there = linear.map(|linear| {
-                let spread = self.spread(&linear, &errors);
-                (self.value(&linear, &spread), spread, linear)
+                let scatter = self.estimate_errors(&linear, &errors);
+                (self.log_posterior(&linear, &next, &scatter), scatter, linear)
             });
             match there {
-                Some((value, spread, linear)) if value > best.0 + MIN_GAIN => {
-                    (best, errors) = ((value, self.values.clone()), spread);
-                    step = self.step_from(&linear, &errors)?;
+                Some((value, scatter, linear)) if value > best.0 + MIN_GAIN => {
+                    step = self.step_from(&linear, &next, &scatter)?;
+                    (best, errors) = ((value, next), scatter);
                 }
                 // Too far: outside the validity of the linearization.
-                _ if is_final && self.largest_share(&step) >= MIN_STEP => step *= SHORTER,
+                _ if is_final && self.problem.largest_share(&step) >= MIN_STEP => step *= SHORTER,
                 _ => break,
             }
         }
-        self.values = best.1;
-        Ok(SearchResult::End { values: listed(&self.values), errors, log_posterior: best.0 })
+        let (log_posterior, Point { values, .. }) = best;
+        Ok(SearchResult::End { values: listed(&values), errors, log_posterior })
     }
 
-    /// Optimal step of the linearization from the current values.
+    /// Optimal step of the linearization about a point.
     fn step_from(
-        &mut self,
+        &self,
         linear: &LinearizedModel,
+        point: &Point,
         errors: &ErrorModel,
     ) -> Result<DVector<f64>, FitError> {
-        let from = self.values.clone();
-        self.improve(linear, errors)?;
-        Ok(&self.values - from)
+        Ok(self.improve(linear, point, errors, None)?.point.values - &point.values)
     }
 }

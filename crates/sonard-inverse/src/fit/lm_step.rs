@@ -2,7 +2,7 @@
 
 use nalgebra::{Cholesky, DVector};
 
-use super::{FitError, Fitter};
+use super::{FitError, Fitter, Point, Problem};
 use crate::{
     likelihood::ErrorModel,
     linear::{Derivatives, LinearizedModel},
@@ -17,70 +17,83 @@ const STEPS: usize = 12;
 /// Stiffness of a held combination relative to the stiffest parameter.
 const STIFF: f64 = 1e3;
 
+/// Point after some steps, and the largest step relative to the validity of the linearization.
+pub(super) struct Improved {
+    pub(super) point: Point,
+    pub(super) largest: f64,
+}
+
 impl Fitter<'_> {
     /// Rotates each sweep with a fitted heading to its best value in discrete steps on either side.
     /// A heading changes no path of an on-axis transducer, only the ends of arcs, which carry
     /// little information from afar. For a single sweep the threshold, which shifts all ends, is
-    /// varied as well.
+    /// varied as well. Returns the changes.
     pub(super) fn turn(
-        &mut self,
+        &self,
+        point: &Point,
         errors: &ErrorModel,
         step_deg: f64,
         steps: i32,
-    ) -> Result<bool, FitError> {
-        let (world, poses) = (self.moved_world()?, self.poses());
-        let index =
-            |parameter: &Parameter| self.parameters.iter().position(|of| **of == *parameter);
-        let threshold = index(&Parameter::Threshold).filter(|_| self.sweeps.len() == 1);
+    ) -> Result<DVector<f64>, FitError> {
+        let problem = &self.problem;
+        let (world, poses) = (self.move_world(&point.values)?, problem.poses(&point.values));
+        let threshold =
+            problem.index_of(&Parameter::Threshold).filter(|_| problem.sweeps.len() == 1);
         let step_db = THRESHOLD_OF_TURN * step_deg;
         let thresholds_db: Vec<f64> = match threshold {
             Some(_) => (-2..=2).map(|step| f64::from(step) * step_db).collect(),
             None => vec![0.0],
         };
-        let mut changes: Vec<(usize, f64)> = Vec::new();
-        for at in 0..self.parameters.len() {
-            let Parameter::Heading(sweep) = *self.parameters[at] else { continue };
+        let mut changes = problem.zero();
+        for (at, parameter) in problem.parameters.iter().enumerate() {
+            let Parameter::Heading(sweep) = **parameter else { continue };
             let turns: Vec<f64> = (-steps..=steps).map(|step| f64::from(step) * step_deg).collect();
-            let (sweep, pose) = (&self.sweeps[sweep], &poses[sweep]);
             let tried = LinearizedModel::turned(
-                &self.models,
+                &self.simulators.borrow(),
                 &world,
-                sweep,
-                pose,
+                &problem.sweeps[sweep],
+                &poses[sweep],
                 &turns,
                 &thresholds_db,
                 errors,
             )?;
             let cost =
-                |at: usize, by: f64| 0.5 * self.precision(at) * (self.values[at] + by).powi(2);
+                |at: usize, by: f64| 0.5 * problem.precision(at) * (point.values[at] + by).powi(2);
             let value = |&(by, db, likely): &(f64, f64, f64)| {
                 likely - cost(at, by) - threshold.map_or(0.0, |threshold| cost(threshold, db))
             };
             let best = tried.iter().max_by(|a, b| value(a).total_cmp(&value(b)));
             if let Some(&(by, db, _)) = best {
-                changes.push((at, by));
-                changes.extend(threshold.map(|threshold| (threshold, db)));
+                changes[at] += by;
+                if let Some(threshold) = threshold {
+                    changes[threshold] += db;
+                }
             }
         }
-        changes.iter().for_each(|&(at, by)| self.values[at] += by);
-        Ok(changes.iter().any(|(_, by)| *by != 0.0))
+        Ok(changes)
     }
 
-    /// Optimizes on the linearization within its limits; returns the largest step relative to them.
+    /// Optimizes on the linearization about a point within its limits, by Levenberg-Marquardt
+    /// steps. `held` is a linear combination of the parameters to keep constant.
     pub(super) fn improve(
-        &mut self,
+        &self,
         linear: &LinearizedModel,
+        point: &Point,
         errors: &ErrorModel,
-    ) -> Result<f64, FitError> {
-        let mut change = self.still();
+        held: Option<&DVector<f64>>,
+    ) -> Result<Improved, FitError> {
+        let problem = &self.problem;
+        let mut change = problem.zero();
         let mut damping = 1e-3;
         let mut curve = linear.curve(&change, errors);
-        let mut value = curve.value + self.log_prior(&self.values);
+        let mut value = curve.value + problem.log_prior(&point.values);
         for _ in 0..STEPS {
-            let step = self.step(&curve, &change, damping).ok_or(FitError::Degenerate)?;
-            let next = self.bounded(&(&change + step));
+            let step = problem
+                .lm_step(&curve, &point.values, &change, damping, held)
+                .ok_or(FitError::Degenerate)?;
+            let next = problem.bounded(&point.values, &(&change + step));
             let next_value =
-                linear.log_likelihood(&next, errors) + self.log_prior(&(&self.values + &next));
+                linear.log_likelihood(&next, errors) + problem.log_prior(&(&point.values + &next));
             if next_value > value {
                 let is_done = next_value - value < 1e-4;
                 (change, value) = (next, next_value);
@@ -96,11 +109,12 @@ impl Fitter<'_> {
                 }
             }
         }
-        let largest = self.largest_share(&change);
-        self.values += change;
-        Ok(largest)
+        let largest = problem.largest_share(&change);
+        Ok(Improved { point: point.moved_to(&point.values + change), largest })
     }
+}
 
+impl Problem<'_> {
     /// Largest component of a change, relative to the maximum step of its parameter.
     pub(super) fn largest_share(&self, change: &DVector<f64>) -> f64 {
         let shares = change.iter().zip(&self.parameters).map(|(by, of)| by.abs() / of.step());
@@ -108,27 +122,29 @@ impl Fitter<'_> {
     }
 
     /// Solves the damped normal equations with active bound constraints.
-    fn step(
+    fn lm_step(
         &self,
         curve: &Derivatives,
+        values: &DVector<f64>,
         change: &DVector<f64>,
         damping: f64,
+        held: Option<&DVector<f64>>,
     ) -> Option<DVector<f64>> {
         let mut normal = curve.information.clone();
         let mut right = curve.gradient.clone();
         for at in 0..right.len() {
             normal[(at, at)] *= 1.0 + damping;
             normal[(at, at)] += self.precision(at) * (1.0 + damping);
-            right[at] -= self.precision(at) * (self.values[at] + change[at]);
+            right[at] -= self.precision(at) * (values[at] + change[at]);
         }
-        if let Some(held) = &self.held {
+        if let Some(held) = held {
             let sigmas = self.prior_sigmas();
             let stiffest = normal.diagonal().component_mul(&sigmas).component_mul(&sigmas).max();
             normal += STIFF * stiffest * held * held.transpose();
             right -= STIFF * stiffest * held.dot(change) * held;
         }
         for at in 0..right.len() {
-            let (min, max) = self.limits_of_change(at);
+            let (min, max) = self.limits_of_change(values, at);
             let is_held =
                 (change[at] <= min && right[at] < 0.0) || (change[at] >= max && right[at] > 0.0);
             if is_held {
@@ -141,17 +157,12 @@ impl Fitter<'_> {
     }
 
     /// Clamps a change to the validity of the linearization and to the bounds.
-    fn bounded(&self, change: &DVector<f64>) -> DVector<f64> {
+    fn bounded(&self, values: &DVector<f64>, change: &DVector<f64>) -> DVector<f64> {
         let bounded = change.iter().enumerate().map(|(at, by)| {
-            let (step, (min, max)) = (self.parameters[at].step(), self.limits_of_change(at));
+            let step = self.parameters[at].step();
+            let (min, max) = self.limits_of_change(values, at);
             by.clamp(min.max(-step), max.min(step))
         });
         DVector::from_iterator(change.len(), bounded)
-    }
-
-    /// Bounds on the change of a parameter from its current value.
-    fn limits_of_change(&self, at: usize) -> (f64, f64) {
-        let (min, max) = self.start.limits(self.parameters[at]);
-        (min - self.values[at], max - self.values[at])
     }
 }

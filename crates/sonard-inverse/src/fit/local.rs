@@ -5,9 +5,8 @@ use std::slice;
 use nalgebra::DVector;
 use sonard_model::geometry::Pose;
 
-use super::{FitError, FitOptions, FitResult, Fitter, continuation::STAGES};
+use super::{FitError, FitOptions, FitResult, Fitter, Point, Problem, continuation::STAGES};
 use crate::{
-    candidates::Phases,
     likelihood::ErrorModel,
     progress::{FitObserver, NoObserver},
     sweep::FitSweep,
@@ -41,59 +40,62 @@ pub fn fit_from(
     errors: &ErrorModel,
 ) -> Result<FitResult, FitError> {
     assert_eq!(start.len(), fit.priors.len(), "one value for each parameter");
-    let models = SimulatorSet::new(&world.with_face_on_axis())?;
-    let mut fitter = Fitter::new(models, world, sweeps, fit, &NoObserver)?;
-    fitter.values = DVector::from_row_slice(start);
-    fitter.phases = Phases::Known;
-    let end = fitter.settled(*errors)?;
-    let end = fitter.polished(end)?;
-    let beside = fitter.still();
-    fitter.end(end, &beside)
+    let simulators = SimulatorSet::new(&world.with_face_on_axis())?;
+    let fitter = Fitter::new(Problem::new(world, sweeps, fit)?, simulators, &NoObserver);
+    let optimum = fitter.converge(&Point::coherent(DVector::from_row_slice(start)), *errors)?;
+    fitter.report(fitter.refine(optimum)?, &fitter.problem.zero())
 }
 
 /// Fits a single sweep roughly, by every other stage.
 pub(crate) fn approach(
-    models: SimulatorSet,
+    simulators: SimulatorSet,
     world: &World,
     sweep: &FitSweep,
     fit: &FitOptions,
-    watch: &dyn FitObserver,
+    observer: &dyn FitObserver,
 ) -> Result<RoughFit, FitError> {
-    let mut fitter = Fitter::new(models, world, slice::from_ref(sweep), fit, watch)?;
-    Ok(fitter.approached((0..STAGES.len()).step_by(2))?.0)
+    let problem = Problem::new(world, slice::from_ref(sweep), fit)?;
+    let fitter = Fitter::new(problem, simulators, observer);
+    Ok(fitter.approach_roughly((0..STAGES.len()).step_by(2))?.0)
 }
 
 /// Fits a single sweep from a nearby start, unless its rough log-posterior is below `least`.
 /// Returns that log-posterior as well.
 pub(crate) fn fit_near(
-    models: SimulatorSet,
+    simulators: SimulatorSet,
     world: &World,
     sweep: &FitSweep,
     fit: &FitOptions,
     least: f64,
-    watch: &dyn FitObserver,
+    observer: &dyn FitObserver,
 ) -> Result<Option<(FitResult, f64)>, FitError> {
-    let mut fitter = Fitter::new(models, world, slice::from_ref(sweep), fit, watch)?;
-    let (RoughFit { log_posterior, .. }, errors) = fitter.approached(NEAR.into_iter())?;
+    let problem = Problem::new(world, slice::from_ref(sweep), fit)?;
+    let fitter = Fitter::new(problem, simulators, observer);
+    let (RoughFit { log_posterior, .. }, point, errors) =
+        fitter.approach_roughly(NEAR.into_iter())?;
     if log_posterior < least {
         return Ok(None);
     }
-    let end = fitter.settle(errors)?;
-    let beside = fitter.still();
-    Ok(Some((fitter.end(end, &beside)?, log_posterior)))
+    let optimum = fitter.settle(&point, errors)?;
+    Ok(Some((fitter.report(optimum, &fitter.problem.zero())?, log_posterior)))
 }
 
 impl Fitter<'_> {
-    fn approached(
-        &mut self,
+    /// Runs some stages of the continuation from the prior mean, without outlier arcs.
+    fn approach_roughly(
+        &self,
         stages: impl Iterator<Item = usize>,
-    ) -> Result<(RoughFit, ErrorModel), FitError> {
-        let mut errors = self.rough_errors().without_arcs();
-        self.approach(&mut errors, stages)?;
-        let linear = self.linear()?;
-        let spread = self.spread(&linear, &errors);
-        let log_posterior = self.value(&linear, &spread);
-        let found = RoughFit { pose: self.poses()[0], log_posterior, sigma_m: spread.sigma_m };
-        Ok((found, errors))
+    ) -> Result<(RoughFit, Point, ErrorModel), FitError> {
+        let (problem, errors) = (&self.problem, self.problem.rough_errors().without_arcs());
+        let (point, errors) =
+            self.run_continuation(Point::incoherent(problem.zero()), errors, stages)?;
+        let linear = self.linearize(&point)?;
+        let scatter = self.estimate_errors(&linear, &errors);
+        let found = RoughFit {
+            pose: problem.poses(&point.values)[0],
+            log_posterior: self.log_posterior(&linear, &point, &scatter),
+            sigma_m: scatter.sigma_m,
+        };
+        Ok((found, point, errors))
     }
 }

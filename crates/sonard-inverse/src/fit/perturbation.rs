@@ -8,14 +8,14 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::{
-    FitError, Fitter, Optimum, Search,
+    FitError, Fitter, Optimum, Point, Problem, Search,
     checkpoint::{SearchResult, listed},
     continuation::STAGES,
+    lm_step::Improved,
     one_of_many,
     refine::FAR_BELOW,
 };
 use crate::{
-    candidates::Phases,
     likelihood::{ErrorModel, READINGS_PER_ARC},
     progress::FitProgress,
 };
@@ -50,132 +50,219 @@ pub(super) struct StartPoint {
 }
 
 impl Optimum {
-    fn place(&self) -> StartPoint {
-        StartPoint { values: self.values.clone(), value: self.value }
+    fn start_point(&self) -> StartPoint {
+        StartPoint { values: self.point.values.clone(), value: self.value }
     }
 }
 
 impl Fitter<'_> {
     /// Best optimum over all starts, and the additional variances due to the others. If prediction
     /// fails, as within a wall, there is no other start.
-    pub(super) fn likeliest(&mut self) -> Result<(Optimum, DVector<f64>), FitError> {
-        let mut best = self.attempt(self.still(), 0)?;
-        let mut seen: Vec<StartPoint> = vec![best.place()];
-        if self.is_astray(&best) || self.has_few_echoes() {
-            let mut ends = self.ends_from_elsewhere()?;
-            ends.sort_by(|a, b| b.value.total_cmp(&a.value));
-            for (number, end) in ends.into_iter().enumerate() {
-                seen.push(end.place());
-                if number < POLISHED_OPEN && self.has_few_echoes() {
-                    keep_likelier(&mut best, one_of_many(self.polished(end))?);
+    pub(super) fn find_optimum(&self) -> Result<(Optimum, DVector<f64>), FitError> {
+        let problem = &self.problem;
+        let mut best = self.fit_from_stage(problem.zero(), 0)?;
+        let mut seen: Vec<StartPoint> = vec![best.start_point()];
+        if self.is_failed(&best) || problem.has_few_echoes() {
+            let mut optima = self.restart_elsewhere()?;
+            optima.sort_by(|a, b| b.value.total_cmp(&a.value));
+            for (number, optimum) in optima.into_iter().enumerate() {
+                seen.push(optimum.start_point());
+                if number < POLISHED_OPEN && problem.has_few_echoes() {
+                    keep_likelier(&mut best, one_of_many(self.refine(optimum))?);
                 } else {
-                    keep_likelier(&mut best, Some(end));
+                    keep_likelier(&mut best, Some(optimum));
                 }
             }
         }
-        if self.fit.search == Search::Quick {
-            let places = self.places(&best)?;
-            for place in places.iter().take(FOLLOWED) {
-                keep_likelier(&mut best, one_of_many(self.attempt(place.values.clone(), STAGE))?);
+        if problem.options.search == Search::Quick {
+            let starts = self.perturb(&best)?;
+            for start in starts.iter().take(FOLLOWED) {
+                let optimum = self.fit_from_stage(start.values.clone(), STAGE);
+                keep_likelier(&mut best, one_of_many(optimum)?);
             }
-            let variances = self.variances_of_others(&best, &places)?;
+            let variances = self.variances_of_starts(&best, &starts)?;
             return Ok((best, variances));
         }
-        best = self.polished(best)?;
-        let places = self.places(&best)?;
-        for end in self.ends(&best, &places)? {
-            if end.value > best.value - FAR_BELOW {
-                seen.push(end.place());
-                keep_likelier(&mut best, one_of_many(self.polished(end))?);
+        best = self.refine(best)?;
+        let starts = self.perturb(&best)?;
+        for optimum in self.follow(&best, &starts)? {
+            if optimum.value > best.value - FAR_BELOW {
+                seen.push(optimum.start_point());
+                keep_likelier(&mut best, one_of_many(self.refine(optimum))?);
             }
         }
-        best = self.along_ridges(best)?;
-        let variances = self.variances_of_all(&best, &places, &seen)?;
+        best = self.search_ridges(best)?;
+        let variances = self.variances_of_all(&best, &starts, &seen)?;
         Ok((best, variances))
     }
 
-    /// Distinct optima reached from some points, likeliest first.
-    fn ends(&mut self, best: &Optimum, places: &[StartPoint]) -> Result<Vec<Optimum>, FitError> {
+    /// Distinct optima reached from some starts, likeliest first.
+    fn follow(&self, best: &Optimum, starts: &[StartPoint]) -> Result<Vec<Optimum>, FitError> {
         let close = widened(&best.errors, CLOSE);
         let mut tried: Vec<Optimum> = Vec::new();
-        for (number, place) in places.iter().take(ENDS).enumerate() {
-            (self.values, self.phases) = (place.values.clone(), Phases::Unknown);
-            let end = self.settled(close).and_then(|end| self.with_phases(end));
-            tried.extend(one_of_many(end)?);
+        for (number, start) in starts.iter().take(ENDS).enumerate() {
+            let optimum = self.settle(&Point::incoherent(start.values.clone()), close);
+            tried.extend(one_of_many(optimum)?);
             if number < STAGED {
-                tried.extend(one_of_many(self.attempt(place.values.clone(), STAGE))?);
+                tried.extend(one_of_many(self.fit_from_stage(start.values.clone(), STAGE))?);
             }
         }
         tried.sort_by(|a, b| b.value.total_cmp(&a.value));
-        let mut ends: Vec<Optimum> = Vec::new();
-        for end in tried {
-            let is_apart = |other: &Optimum| self.is_apart(&end.values, &other.values);
-            if ends.iter().chain([best]).all(is_apart) {
-                ends.push(end);
+        let mut optima: Vec<Optimum> = Vec::new();
+        for optimum in tried {
+            let is_apart =
+                |other: &Optimum| self.problem.is_apart(&optimum.point.values, &other.point.values);
+            if optima.iter().chain([best]).all(is_apart) {
+                optima.push(optimum);
             }
         }
-        ends.truncate(POLISHED);
-        Ok(ends)
+        optima.truncate(POLISHED);
+        Ok(optima)
     }
 
     /// Optimum reached from a start, by continuation from a given stage.
-    pub(super) fn attempt(
-        &mut self,
+    pub(super) fn fit_from_stage(
+        &self,
         start: DVector<f64>,
         stage: usize,
     ) -> Result<Optimum, FitError> {
-        (self.values, self.phases) = (start, Phases::Unknown);
-        let mut errors = self.rough_errors();
+        let mut errors = self.problem.rough_errors();
         errors.sigma_m *= STAGES[stage].0;
-        self.approach(&mut errors, stage..STAGES.len())?;
-        self.settle(errors)
+        let stages = stage..STAGES.len();
+        let (point, errors) = self.run_continuation(Point::incoherent(start), errors, stages)?;
+        self.settle(&point, errors)
     }
 
     /// Distinct points along the weakly constrained directions about an optimum, each improved;
     /// likeliest first.
-    fn places(&mut self, end: &Optimum) -> Result<Vec<StartPoint>, FitError> {
-        let close = widened(&end.errors, CLOSE);
+    fn perturb(&self, optimum: &Optimum) -> Result<Vec<StartPoint>, FitError> {
+        let about = Point::incoherent(optimum.point.values.clone());
+        let close = widened(&optimum.errors, CLOSE);
         let (places, apart) = PLACES;
         let mut tried: Vec<StartPoint> = Vec::new();
-        let weak =
-            self.weak_directions(&end.values, &widened(&end.errors, ROUGH), Phases::Unknown)?;
+        let weak = self.weak_directions(&about, &widened(&optimum.errors, ROUGH))?;
         let (mut number, of) = (0, weak.len() * 2 * places as usize);
         for (direction, sigma) in weak {
             for place in (-places..=places).filter(|place| *place != 0) {
                 number += 1;
                 let by = f64::from(place) * apart * sigma;
-                let start = self.limited(&end.values + by * &direction);
-                tried.extend(self.place(start, &close, (number, of))?);
+                let start = about.moved_to(self.problem.limited(&about.values + by * &direction));
+                tried.extend(self.improve_start(&start, &close, (number, of))?);
             }
         }
-        Ok(self.distinct(tried, &[&end.values]))
+        Ok(self.problem.distinct(tried, &[&about.values]))
     }
 
-    /// Improves a start and reports progress; `None` if prediction fails.
-    pub(super) fn place(
-        &mut self,
-        start: DVector<f64>,
+    /// Improves a start by two sets of steps and reports progress; `None` if prediction fails.
+    pub(super) fn improve_start(
+        &self,
+        start: &Point,
         errors: &ErrorModel,
-        (place, of): (usize, usize),
+        (number, of): (usize, usize),
     ) -> Result<Option<StartPoint>, FitError> {
-        self.place_by(|fitter| {
-            fitter.watch.progress(FitProgress::Restart { start: place, of });
-            fitter.improved(start, errors)
+        self.run_start(|| {
+            self.observer.progress(FitProgress::Restart { start: number, of });
+            self.improve_twice(start, errors)
         })
     }
 
     /// Point found by a search; `None` if prediction fails.
-    pub(super) fn place_by(
-        &mut self,
-        search: impl FnOnce(&mut Self) -> Result<SearchResult, FitError>,
+    pub(super) fn run_start(
+        &self,
+        search: impl FnOnce() -> Result<SearchResult, FitError>,
     ) -> Result<Option<StartPoint>, FitError> {
-        match one_of_many(self.found(search))? {
+        match one_of_many(self.run_or_replay(search))? {
             None => Ok(None),
             Some(SearchResult::Place { values, log_posterior: value }) => {
                 Ok(Some(StartPoint { values: DVector::from_vec(values), value }))
             }
             Some(_) => Err(FitError::OtherFit),
         }
+    }
+
+    fn improve_twice(&self, start: &Point, errors: &ErrorModel) -> Result<SearchResult, FitError> {
+        let mut point = start.clone();
+        for _ in 0..2 {
+            let linear = self.linearize(&point)?;
+            Improved { point, .. } = self.improve(&linear, &point, errors, None)?;
+        }
+        let linear = self.linearize(&point)?;
+        let log_posterior = self.log_posterior(&linear, &point, errors);
+        Ok(SearchResult::Place { values: listed(&point.values), log_posterior })
+    }
+
+    /// Additional variances due to other points that explain the readings nearly as well.
+    fn variances_of_starts(
+        &self,
+        best: &Optimum,
+        starts: &[StartPoint],
+    ) -> Result<DVector<f64>, FitError> {
+        let point = Point::incoherent(best.point.values.clone());
+        let linear = self.linearize(&point)?;
+        let of_best = self.log_posterior(&linear, &point, &widened(&best.errors, CLOSE));
+        let others = starts.iter().map(|start| (&start.values, odds(start.value, of_best)));
+        Ok(self.problem.variances_about(&point.values, others.collect()))
+    }
+
+    /// Additional variances of a thorough fit: distinct points and other optima.
+    fn variances_of_all(
+        &self,
+        best: &Optimum,
+        starts: &[StartPoint],
+        optima: &[StartPoint],
+    ) -> Result<DVector<f64>, FitError> {
+        let (problem, values) = (&self.problem, &best.point.values);
+        let point = Point::incoherent(values.clone());
+        let close = widened(&best.errors, CLOSE);
+        let linear = self.linearize(&point)?;
+        let of_best = self.log_posterior(&linear, &point, &close);
+        // The optimum differs slightly with a wider error model; points near either are the same.
+        let home = match one_of_many(self.improve_twice(&point, &close))? {
+            Some(SearchResult::Place { values, log_posterior }) if log_posterior > of_best => {
+                StartPoint { values: DVector::from_vec(values), value: log_posterior }
+            }
+            _ => StartPoint { values: values.clone(), value: of_best },
+        };
+        let starts = starts.iter().map(|start| (start, home.value));
+        let optima = optima.iter().map(|optimum| (optimum, best.value));
+        let mut others: Vec<(&DVector<f64>, f64)> = Vec::new();
+        for (other, of) in starts.chain(optima) {
+            let known = others.iter().map(|(values, _)| *values);
+            let mut known = known.chain([&home.values, values]);
+            if known.all(|known| problem.is_apart(&other.values, known)) {
+                others.push((&other.values, odds(other.value, of)));
+            }
+        }
+        Ok(problem.variances_about(values, others))
+    }
+
+    /// Weakly constrained directions about a point, in the parameters' units, with their standard
+    /// deviations: the largest eigenvalues of the posterior covariance relative to the prior.
+    pub(super) fn weak_directions(
+        &self,
+        about: &Point,
+        errors: &ErrorModel,
+    ) -> Result<Vec<(DVector<f64>, f64)>, FitError> {
+        let problem = &self.problem;
+        let curve = self.linearize(about)?.curve(&problem.zero(), errors);
+        let covariance = problem.covariance(curve.information)?;
+        let sigmas = problem.prior_sigmas();
+        let prior = DMatrix::from_diagonal(&sigmas.map(f64::recip));
+        let eigen = SymmetricEigen::new(&prior * covariance * &prior);
+        let mut order: Vec<usize> = (0..sigmas.len()).collect();
+        order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+        order.retain(|&at| eigen.eigenvalues[at] > MIN_SHARE * MIN_SHARE);
+        let direction = |at: usize| {
+            (eigen.eigenvectors.column(at).component_mul(&sigmas), eigen.eigenvalues[at].sqrt())
+        };
+        Ok(order.into_iter().take(DIRECTIONS).map(direction).collect())
+    }
+}
+
+impl Problem<'_> {
+    /// Returns `true` if fits from two points would probably end in different optima.
+    pub(super) fn is_apart(&self, a: &DVector<f64>, b: &DVector<f64>) -> bool {
+        (a - b).component_div(&self.prior_sigmas()).amax() > 0.5 * MIN_SHARE
     }
 
     /// Points distinct from each other and from known ones, likeliest first.
@@ -185,128 +272,29 @@ impl Fitter<'_> {
         known: &[&DVector<f64>],
     ) -> Vec<StartPoint> {
         tried.sort_by(|a, b| b.value.total_cmp(&a.value));
-        let mut places: Vec<StartPoint> = Vec::new();
-        for place in tried {
-            let known = places.iter().map(|other| &other.values).chain(known.iter().copied());
-            if known.into_iter().all(|other| self.is_apart(&place.values, other)) {
-                places.push(place);
+        let mut starts: Vec<StartPoint> = Vec::new();
+        for start in tried {
+            let known = starts.iter().map(|other| &other.values).chain(known.iter().copied());
+            if known.into_iter().all(|other| self.is_apart(&start.values, other)) {
+                starts.push(start);
             }
         }
-        places
-    }
-
-    /// Improves a start by two sets of steps.
-    fn improved(
-        &mut self,
-        start: DVector<f64>,
-        errors: &ErrorModel,
-    ) -> Result<SearchResult, FitError> {
-        self.values = start;
-        for _ in 0..2 {
-            let linear = self.linear()?;
-            self.improve(&linear, errors)?;
-        }
-        let linear = self.linear()?;
-        let log_posterior = self.value(&linear, errors);
-        Ok(SearchResult::Place { values: listed(&self.values), log_posterior })
-    }
-
-    /// Additional variances due to other points that explain the readings nearly as well.
-    fn variances_of_others(
-        &mut self,
-        best: &Optimum,
-        places: &[StartPoint],
-    ) -> Result<DVector<f64>, FitError> {
-        (self.values, self.phases) = (best.values.clone(), Phases::Unknown);
-        let linear = self.linear()?;
-        let of_best = self.value(&linear, &widened(&best.errors, CLOSE));
-        let others = places.iter().map(|place| (&place.values, odds(place.value, of_best)));
-        Ok(self.spread_of(best, others.collect()))
-    }
-
-    /// Additional variances of a thorough fit: distinct points and other optima.
-    fn variances_of_all(
-        &mut self,
-        best: &Optimum,
-        places: &[StartPoint],
-        ends: &[StartPoint],
-    ) -> Result<DVector<f64>, FitError> {
-        (self.values, self.phases) = (best.values.clone(), Phases::Unknown);
-        let close = widened(&best.errors, CLOSE);
-        let linear = self.linear()?;
-        let of_best = self.value(&linear, &close);
-        // The optimum differs slightly with a wider error model; points near either are the same.
-        let home = match one_of_many(self.improved(best.values.clone(), &close))? {
-            Some(SearchResult::Place { values, log_posterior }) if log_posterior > of_best => {
-                StartPoint { values: DVector::from_vec(values), value: log_posterior }
-            }
-            _ => StartPoint { values: best.values.clone(), value: of_best },
-        };
-        let places = places.iter().map(|place| (place, home.value));
-        let ends = ends.iter().map(|end| (end, best.value));
-        let mut others: Vec<(&DVector<f64>, f64)> = Vec::new();
-        for (place, of) in places.chain(ends) {
-            let known = others.iter().map(|(values, _)| *values);
-            let mut known = known.chain([&home.values, &best.values]);
-            if known.all(|known| self.is_apart(&place.values, known)) {
-                others.push((&place.values, odds(place.value, of)));
-            }
-        }
-        Ok(self.spread_of(best, others))
+        starts
     }
 
     /// Variances about the best values of other values weighted by their odds.
-    fn spread_of(&self, best: &Optimum, others: Vec<(&DVector<f64>, f64)>) -> DVector<f64> {
+    fn variances_about(
+        &self,
+        best: &DVector<f64>,
+        others: Vec<(&DVector<f64>, f64)>,
+    ) -> DVector<f64> {
         let all: f64 = 1.0 + others.iter().map(|(_, odds)| odds).sum::<f64>();
-        let mut variances = self.still();
+        let mut variances = self.zero();
         for (values, odds) in others {
-            let away = values - &best.values;
+            let away = values - best;
             variances += away.component_mul(&away) * (odds / all);
         }
         variances
-    }
-
-    /// Weakly constrained directions, in the parameters' units, with their standard deviations: the
-    /// largest eigenvalues of the posterior covariance relative to the prior.
-    pub(super) fn weak_directions(
-        &mut self,
-        about: &DVector<f64>,
-        errors: &ErrorModel,
-        phases: Phases,
-    ) -> Result<Vec<(DVector<f64>, f64)>, FitError> {
-        (self.values, self.phases) = (about.clone(), phases);
-        let curve = self.linear()?.curve(&self.still(), errors);
-        let covariance = self.covariance(curve.information).ok_or(FitError::Degenerate)?;
-        let sigmas = self.prior_sigmas();
-        let prior = DMatrix::from_diagonal(&sigmas.map(f64::recip));
-        let of = SymmetricEigen::new(&prior * covariance * &prior);
-        let mut order: Vec<usize> = (0..sigmas.len()).collect();
-        order.sort_by(|a, b| of.eigenvalues[*b].total_cmp(&of.eigenvalues[*a]));
-        order.retain(|&at| of.eigenvalues[at] > MIN_SHARE * MIN_SHARE);
-        let direction = |at: usize| {
-            (of.eigenvectors.column(at).component_mul(&sigmas), of.eigenvalues[at].sqrt())
-        };
-        Ok(order.into_iter().take(DIRECTIONS).map(direction).collect())
-    }
-
-    pub(super) fn prior_sigmas(&self) -> DVector<f64> {
-        DVector::from_iterator(
-            self.fit.priors.len(),
-            self.fit.priors.iter().map(|prior| prior.sigma),
-        )
-    }
-
-    pub(super) fn limited(&self, mut values: DVector<f64>) -> DVector<f64> {
-        for (value, parameter) in values.iter_mut().zip(&self.parameters) {
-            let (min, max) = self.start.limits(parameter);
-            *value = value.clamp(min, max);
-        }
-        values
-    }
-
-    /// Returns `true` if fits from two points would probably end in different optima.
-    pub(super) fn is_apart(&self, a: &DVector<f64>, b: &DVector<f64>) -> bool {
-        (a - b).component_div(&self.prior_sigmas()).amax() > 0.5 * MIN_SHARE
     }
 }
 

@@ -9,8 +9,9 @@
 use nalgebra::DVector;
 
 use super::{
-    FitError, Fitter, Optimum,
+    FitError, Fitter, Optimum, Point, Problem,
     checkpoint::{SearchResult, listed},
+    lm_step::Improved,
     one_of_many,
     perturbation::{CLOSE, ROUGH, StartPoint, keep_likelier, widened},
     refine::FAR_BELOW,
@@ -33,21 +34,24 @@ const ROUNDS: usize = 3;
 /// Direction in the parameters' units, with its standard deviation.
 type Direction = (DVector<f64>, f64);
 
+/// Knowledge of the phases and error model of one set of steps.
+type StepModel = (Phases, ErrorModel);
+
 impl Fitter<'_> {
     /// Best optimum over the peaks along the ridges through an optimum, including itself. If ranges
     /// are too uncertain for phases, that one.
-    pub(super) fn along_ridges(&mut self, mut best: Optimum) -> Result<Optimum, FitError> {
-        if self.missed_wavelengths(&best.errors) > WELL_KNOWN {
+    pub(super) fn search_ridges(&self, mut best: Optimum) -> Result<Optimum, FitError> {
+        if self.problem.range_error_wavelengths(&best.errors) > WELL_KNOWN {
             return Ok(best);
         }
         for _ in 0..ROUNDS {
-            let (before, value) = (best.values.clone(), best.value);
-            for end in self.ends_of_peaks(&best)? {
-                if end.value > value - FAR_BELOW {
-                    keep_likelier(&mut best, one_of_many(self.polished(end))?);
+            let (before, value) = (best.point.values.clone(), best.value);
+            for optimum in self.release_peaks(&best)? {
+                if optimum.value > value - FAR_BELOW {
+                    keep_likelier(&mut best, one_of_many(self.refine(optimum))?);
                 }
             }
-            if !self.is_apart(&best.values, &before) {
+            if !self.problem.is_apart(&best.point.values, &before) {
                 break;
             }
         }
@@ -56,36 +60,36 @@ impl Fitter<'_> {
 
     /// Optima reached from peaks, likeliest first: from each directly, and by closer error models
     /// with nothing held.
-    fn ends_of_peaks(&mut self, best: &Optimum) -> Result<Vec<Optimum>, FitError> {
-        let mut ends: Vec<Optimum> = Vec::new();
-        for peak in self.peaks(best)? {
-            ends.extend(self.end_with_phases(peak.values.clone(), &best.errors)?);
-            (self.values, self.phases) = (peak.values, Phases::Known);
-            ends.extend(one_of_many(self.settled(best.errors))?);
+    fn release_peaks(&self, best: &Optimum) -> Result<Vec<Optimum>, FitError> {
+        let mut optima: Vec<Optimum> = Vec::new();
+        for peak in self.find_peaks(best)? {
+            optima.extend(self.converge_with_phases(peak.values.clone(), &best.errors)?);
+            let direct = self.converge(&Point::coherent(peak.values), best.errors);
+            optima.extend(one_of_many(direct)?);
         }
-        ends.sort_by(|a, b| b.value.total_cmp(&a.value));
-        ends.truncate(POLISHED);
-        Ok(ends)
+        optima.sort_by(|a, b| b.value.total_cmp(&a.value));
+        optima.truncate(POLISHED);
+        Ok(optima)
     }
 
     /// Optimum with phases reached from a start by successively narrower error models; `None` if
     /// the ranges there are too uncertain for phases.
-    pub(super) fn end_with_phases(
-        &mut self,
+    pub(super) fn converge_with_phases(
+        &self,
         start: DVector<f64>,
         errors: &ErrorModel,
     ) -> Result<Option<Optimum>, FitError> {
-        let looks = [CLOSE, WITH_PHASES].map(|by| (Phases::Known, spread_by(errors, by)));
-        let Some(place) = self.place_by(|fitter| fitter.looked(start, looks))? else {
+        let steps = [CLOSE, WITH_PHASES].map(|by| (Phases::Known, spread_by(errors, by)));
+        let Some(found) = self.run_start(|| self.improve_by(start, &steps, None))? else {
             return Ok(None);
         };
-        (self.values, self.phases) = (place.values, Phases::Known);
-        let end = one_of_many(self.settled(looks[1].1))?;
-        Ok(end.filter(|end| !self.is_beyond_phases(&end.errors)))
+        let optimum = self.converge(&Point::coherent(found.values), steps[1].1);
+        let optimum = one_of_many(optimum)?;
+        Ok(optimum.filter(|optimum| !self.problem.is_beyond_phases(&optimum.errors)))
     }
 
     /// Local maxima of the profiles along the ridges, likeliest first.
-    fn peaks(&mut self, best: &Optimum) -> Result<Vec<StartPoint>, FitError> {
+    fn find_peaks(&self, best: &Optimum) -> Result<Vec<StartPoint>, FitError> {
         let ridges = self.ridges(best)?;
         let of = ridges.len() * 2 * STEPS.0;
         let mut peaks: Vec<StartPoint> = Vec::new();
@@ -107,12 +111,12 @@ impl Fitter<'_> {
 
     /// Weakly constrained directions, and the threshold: an optimum with a threshold off by many
     /// decibels and an equally wide error model is a trap that no other direction leaves.
-    fn ridges(&mut self, best: &Optimum) -> Result<Vec<Direction>, FitError> {
-        let rough = widened(&best.errors, ROUGH);
-        let mut ridges = self.weak_directions(&best.values, &rough, Phases::Unknown)?;
-        if let Some(at) = self.parameters.iter().position(|of| **of == Parameter::Threshold) {
-            let mut threshold = self.still();
-            threshold[at] = self.fit.priors[at].sigma;
+    fn ridges(&self, best: &Optimum) -> Result<Vec<Direction>, FitError> {
+        let about = Point::incoherent(best.point.values.clone());
+        let mut ridges = self.weak_directions(&about, &widened(&best.errors, ROUGH))?;
+        if let Some(at) = self.problem.index_of(&Parameter::Threshold) {
+            let mut threshold = self.problem.zero();
+            threshold[at] = self.problem.options.priors[at].sigma;
             ridges.push((threshold, 1.0));
         }
         Ok(ridges)
@@ -120,29 +124,27 @@ impl Fitter<'_> {
 
     /// Profile along a ridge from one side to the other, without the middle; `number` steps precede
     /// it.
-    fn profile(
-        &mut self,
+    pub(super) fn profile(
+        &self,
         best: &Optimum,
         (direction, sigma): &Direction,
         (number, of): (usize, usize),
     ) -> Result<Vec<StartPoint>, FitError> {
-        let looks = [
+        let models = [
             (Phases::Unknown, widened(&best.errors, CLOSE)),
             (Phases::Known, spread_by(&best.errors, WITH_PHASES)),
         ];
+        let position = self.problem.position_along(direction);
         let (steps, apart) = STEPS;
         let mut sides: [Vec<StartPoint>; 2] = Default::default();
         for (side, (places, sign)) in sides.iter_mut().zip([-1.0, 1.0]).enumerate() {
-            let mut from = best.values.clone();
+            let mut from = best.point.values.clone();
             for step in 1..=steps {
-                let start = self.limited(from + sign * apart * *sigma * direction);
-                let place = number + side * steps + step;
-                let found = self.place_by(|fitter| {
-                    fitter.watch.progress(FitProgress::Restart { start: place, of });
-                    fitter.held = Some(fitter.along(direction));
-                    let looked = fitter.looked(start, looks);
-                    fitter.held = None;
-                    looked
+                let start = self.problem.limited(from + sign * apart * *sigma * direction);
+                let found = self.run_start(|| {
+                    let start_number = number + side * steps + step;
+                    self.observer.progress(FitProgress::Restart { start: start_number, of });
+                    self.improve_by(start, &models, Some(&position))
                 })?;
                 let Some(found) = found else { break };
                 from = found.values.clone();
@@ -153,29 +155,33 @@ impl Fitter<'_> {
         Ok(before.into_iter().rev().chain(behind).collect())
     }
 
+    /// Improves a start by two sets of steps, with `held` constant; the log-posterior uses the
+    /// observed scatter.
+    fn improve_by(
+        &self,
+        start: DVector<f64>,
+        steps: &[StepModel; 2],
+        held: Option<&DVector<f64>>,
+    ) -> Result<SearchResult, FitError> {
+        let mut point = Point::incoherent(start);
+        for (phases, errors) in steps {
+            point.phases = *phases;
+            let linear = self.linearize(&point)?;
+            Improved { point, .. } = self.improve(&linear, &point, errors, held)?;
+        }
+        let linear = self.linearize(&point)?;
+        let errors = self.estimate_errors(&linear, &steps[1].1);
+        let log_posterior = self.log_posterior(&linear, &point, &errors);
+        Ok(SearchResult::Place { values: listed(&point.values), log_posterior })
+    }
+}
+
+impl Problem<'_> {
     /// Linear functional that measures the position along a direction, in prior standard
     /// deviations.
-    fn along(&self, direction: &DVector<f64>) -> DVector<f64> {
+    pub(super) fn position_along(&self, direction: &DVector<f64>) -> DVector<f64> {
         let sigmas = self.prior_sigmas();
         direction.component_div(&sigmas).component_div(&sigmas)
-    }
-
-    /// Improves a start with two error models; the log-posterior uses the observed scatter.
-    fn looked(
-        &mut self,
-        start: DVector<f64>,
-        looks: [(Phases, ErrorModel); 2],
-    ) -> Result<SearchResult, FitError> {
-        self.values = start;
-        for (phases, errors) in &looks {
-            self.phases = *phases;
-            let linear = self.linear()?;
-            self.improve(&linear, errors)?;
-        }
-        let linear = self.linear()?;
-        let errors = self.spread(&linear, &looks[1].1);
-        let log_posterior = self.value(&linear, &errors);
-        Ok(SearchResult::Place { values: listed(&self.values), log_posterior })
     }
 }
 

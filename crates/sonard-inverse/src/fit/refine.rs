@@ -11,8 +11,9 @@ use rand_distr::{Distribution as _, StandardNormal};
 use rand_pcg::Pcg64;
 
 use super::{
-    FitError, Fitter, Optimum,
+    FitError, Fitter, Optimum, Point,
     checkpoint::{SearchResult, listed},
+    lm_step::Improved,
     one_of_many,
 };
 use crate::{candidates::Phases, likelihood::ErrorModel};
@@ -33,100 +34,102 @@ const SHRINKS: f64 = 0.9;
 impl Fitter<'_> {
     /// Refines an optimum with phases by random steps distributed as its covariance. Without phases
     /// the posterior is smooth: if that is far likelier, the optimum is returned unchanged.
-    pub(super) fn polished(&mut self, end: Optimum) -> Result<Optimum, FitError> {
-        if self.is_beyond_phases(&end.errors) {
-            return Ok(end);
+    pub(super) fn refine(&self, optimum: Optimum) -> Result<Optimum, FitError> {
+        if self.problem.is_beyond_phases(&optimum.errors) {
+            return Ok(optimum);
         }
-        let with = match end.phases {
+        let coherent = match optimum.point.phases {
             Phases::Known => None,
             Phases::Unknown => {
-                (self.values, self.phases) = (end.values.clone(), Phases::Known);
-                let Some(with) = one_of_many(self.settled(end.errors))? else { return Ok(end) };
-                Some(with)
+                let point = optimum.point.with_phases(Phases::Known);
+                let Some(coherent) = one_of_many(self.converge(&point, optimum.errors))? else {
+                    return Ok(optimum);
+                };
+                Some(coherent)
             }
         };
-        let from = with.as_ref().unwrap_or(&end);
-        if from.value < end.value - FAR_BELOW {
-            return Ok(end);
+        let from = coherent.as_ref().unwrap_or(&optimum);
+        if from.value < optimum.value - FAR_BELOW {
+            return Ok(optimum);
         }
-        let found = self.found(|fitter| fitter.polish(from));
+        let found = self.run_or_replay(|| self.search_randomly(from));
         let (values, errors, log_posterior) = match one_of_many(found)? {
             Some(SearchResult::End { values, errors, log_posterior }) => {
                 (values, errors, log_posterior)
             }
             Some(_) => return Err(FitError::OtherFit),
-            None => return Ok(end),
+            None => return Ok(optimum),
         };
-        if log_posterior < end.value {
-            return Ok(end);
+        if log_posterior < optimum.value {
+            return Ok(optimum);
         }
-        let values = DVector::from_vec(values);
-        Ok(Optimum { value: log_posterior, values, errors, phases: Phases::Known })
+        let point = from.point.moved_to(DVector::from_vec(values));
+        Ok(Optimum { value: log_posterior, point, errors })
     }
 
-    fn polish(&mut self, end: &Optimum) -> Result<SearchResult, FitError> {
-        (self.values, self.phases) = (end.values.clone(), end.phases);
-        let linear = self.linear()?;
-        let mut errors = self.spread(&linear, &end.errors);
-        let mut best = (self.value(&linear, &errors), self.values.clone());
-        best = self.scanned(best, &errors)?;
-        self.values = best.1.clone();
-        let linear = self.linear()?;
-        let curve = linear.curve(&self.still(), &errors.for_information());
-        let covariance = self.covariance(curve.information).ok_or(FitError::Degenerate)?;
+    fn search_randomly(&self, optimum: &Optimum) -> Result<SearchResult, FitError> {
+        let problem = &self.problem;
+        let linear = self.linearize(&optimum.point)?;
+        let mut errors = self.estimate_errors(&linear, &optimum.errors);
+        let value = self.log_posterior(&linear, &optimum.point, &errors);
+        let mut best = self.scan_weak_directions((value, optimum.point.clone()), &errors)?;
+        let linear = self.linearize(&best.1)?;
+        let curve = linear.curve(&problem.zero(), &errors.for_information());
+        let covariance = problem.covariance(curve.information)?;
         let root = Cholesky::new(covariance).ok_or(FitError::Degenerate)?.unpack();
         let mut rng = Pcg64::seed_from_u64(1);
         let mut step = STEP;
         for _ in 0..TRIED {
-            let normal = self.still().map(|_: f64| StandardNormal.sample(&mut rng));
+            let normal = problem.zero().map(|_: f64| StandardNormal.sample(&mut rng));
             let longer: f64 = StandardNormal.sample(&mut rng);
-            self.values = self.limited(&best.1 + step * longer.exp() * (&root * normal));
+            let values = &best.1.values + step * longer.exp() * (&root * normal);
+            let point = best.1.moved_to(problem.limited(values));
             // Prediction may fail, as within a wall.
-            let Some(linear) = one_of_many(self.linear())? else { continue };
-            let value = self.value(&linear, &errors);
+            let Some(linear) = one_of_many(self.linearize(&point))? else { continue };
+            let value = self.log_posterior(&linear, &point, &errors);
             if value > best.0 {
-                let spread = self.spread(&linear, &errors);
-                let with_spread = self.value(&linear, &spread);
-                if with_spread > value {
-                    errors = spread;
+                let scatter = self.estimate_errors(&linear, &errors);
+                let with_scatter = self.log_posterior(&linear, &point, &scatter);
+                if with_scatter > value {
+                    errors = scatter;
                 }
-                best = (value.max(with_spread), self.values.clone());
+                best = (value.max(with_scatter), point);
                 step *= GROWS;
             } else {
                 step *= SHRINKS;
             }
         }
-        let (log_posterior, values) = best;
+        let (log_posterior, Point { values, .. }) = best;
         Ok(SearchResult::End { values: listed(&values), errors, log_posterior })
     }
 
     /// Best of some points along the weakly constrained directions, beyond the reach of the random
-    /// steps, each improved once.
-    fn scanned(
-        &mut self,
-        mut best: (f64, DVector<f64>),
+    /// steps, each improved once; with their log-posteriors.
+    fn scan_weak_directions(
+        &self,
+        mut best: (f64, Point),
         errors: &ErrorModel,
-    ) -> Result<(f64, DVector<f64>), FitError> {
+    ) -> Result<(f64, Point), FitError> {
         let (places, apart) = SCANNED;
         let about = best.1.clone();
-        for (direction, sigma) in self.weak_directions(&about, errors, Phases::Known)? {
+        for (direction, sigma) in self.weak_directions(&about, errors)? {
             for place in (-places..=places).filter(|place| *place != 0) {
                 let by = f64::from(place) * apart * sigma;
-                self.values = self.limited(&about + by * &direction);
-                let value = one_of_many(self.value_improved(errors))?;
-                if let Some(value) = value.filter(|value| *value > best.0) {
-                    best = (value, self.values.clone());
+                let values = self.problem.limited(&about.values + by * &direction);
+                let improved = one_of_many(self.improve_once(&about.moved_to(values), errors))?;
+                if let Some(improved) = improved.filter(|(value, _)| *value > best.0) {
+                    best = improved;
                 }
             }
         }
         Ok(best)
     }
 
-    /// Log-posterior after one improvement from the current values.
-    fn value_improved(&mut self, errors: &ErrorModel) -> Result<f64, FitError> {
-        let linear = self.linear()?;
-        self.improve(&linear, errors)?;
-        let linear = self.linear()?;
-        Ok(self.value(&linear, errors))
+    /// Point after one improvement, with its log-posterior.
+    fn improve_once(&self, point: &Point, errors: &ErrorModel) -> Result<(f64, Point), FitError> {
+        let linear = self.linearize(point)?;
+        let Improved { point, .. } = self.improve(&linear, point, errors, None)?;
+        let linear = self.linearize(&point)?;
+        Ok((self.log_posterior(&linear, &point, errors), point))
     }
 }

@@ -16,7 +16,11 @@ const SPREADS_DB: [f64; 11] = [0.1, 0.25, 0.35, 0.5, 0.7, 1.0, 1.5, 2.5, 4.0, 6.
 
 impl Fitter<'_> {
     /// Updates the error model at the current predictions: one step of expectation-maximization.
-    pub(super) fn spread(&self, linear: &LinearizedModel, errors: &ErrorModel) -> ErrorModel {
+    pub(super) fn estimate_errors(
+        &self,
+        linear: &LinearizedModel,
+        errors: &ErrorModel,
+    ) -> ErrorModel {
         let residuals = linear.residuals(errors);
         let spread = of_clutter(&residuals, errors);
         let mut sizes: Vec<f64> = residuals
@@ -27,9 +31,9 @@ impl Fitter<'_> {
             .collect();
         sizes.sort_by(f64::total_cmp);
         let median_m = sizes.get(sizes.len() / 2).copied().unwrap_or(errors.sigma_m);
-        let still = self.still();
+        let zero = self.problem.zero();
         let likeliest = |tried: &mut dyn Iterator<Item = ErrorModel>, otherwise: ErrorModel| {
-            let likely = |spread: ErrorModel| (linear.log_likelihood(&still, &spread), spread);
+            let likely = |spread: ErrorModel| (linear.log_likelihood(&zero, &spread), spread);
             let best = tried.map(likely).max_by(|a, b| a.0.total_cmp(&b.0));
             best.map_or(otherwise, |(_, spread)| spread)
         };
@@ -38,15 +42,17 @@ impl Fitter<'_> {
             // The median of inliers depends little on the tail: 0.6745 of a normal distribution
             // alone, and 0.72 with a tail of 10 % and twice the length.
             let sigma_m = median_m / (0.6745 + 0.455 * tail_share);
-            let sigma_m = sigma_m.min(self.fit.initial_sigma_m).max(self.least_sigma_m());
+            let sigma_m =
+                sigma_m.min(self.problem.options.initial_sigma_m).max(self.problem.min_sigma_m());
             ErrorModel { sigma_m, tail_weight: tail_share, ..spread }
         };
         let spread = likeliest(&mut TAILS.iter().map(of_tail), spread);
         let sigma_db_per_reflection =
-            if self.is_beyond_phases(&spread) { DB_PER_REFLECTION } else { 0.0 };
+            if self.problem.is_beyond_phases(&spread) { DB_PER_REFLECTION } else { 0.0 };
         let spread = ErrorModel { sigma_db_per_reflection, ..spread };
         let of_threshold = |&sigma_db: &f64| ErrorModel { sigma_db, ..spread };
-        let tried = SPREADS_DB.iter().filter(|sigma_db| **sigma_db >= self.fit.min_sigma_db);
+        let tried =
+            SPREADS_DB.iter().filter(|sigma_db| **sigma_db >= self.problem.options.min_sigma_db);
         likeliest(&mut tried.map(of_threshold), spread)
     }
 }

@@ -47,7 +47,7 @@ impl FitObserver for Recorder {
 
 /// Short fit: few readings of a corner by the fastest engine, one in four of a person who walks
 /// about, so that it restarts elsewhere.
-fn short(parameters: &[(Parameter, f64)]) -> (World, Vec<FitSweep>, FitOptions) {
+pub(crate) fn short(parameters: &[(Parameter, f64)]) -> (World, Vec<FitSweep>, FitOptions) {
     let mut here = world("right-angle-corner", "senscomp-6500");
     here.options = Options {
         engine: EngineOptions::Cone(ConeOptions::default()),
@@ -70,7 +70,7 @@ fn short(parameters: &[(Parameter, f64)]) -> (World, Vec<FitSweep>, FitOptions) 
     (here, vec![sweep], FitOptions::with_priors(parameters.iter().map(of).collect(), 0.1))
 }
 
-const PLACE: [(Parameter, f64); 3] =
+pub(crate) const PLACE: [(Parameter, f64); 3] =
     [(Parameter::X(0), 0.1), (Parameter::Y(0), 0.1), (Parameter::Threshold, 6.0)];
 
 /// All values of a result as bits.
