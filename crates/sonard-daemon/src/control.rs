@@ -23,9 +23,9 @@ use super::{
     air::{AirControl, Reading, watch_thermometer},
     journal::Journal,
     order_error::OrderError,
-    schedule::{QueuedScans, Schedule},
+    schedule::{Due, QueuedScans, Schedule},
     settings::Settings,
-    state::{DaemonState, ScanSettings},
+    state::{ControlSnapshot, DaemonState, ScanSettings, StateEvent},
 };
 
 /// Polling interval of the emergency stop.
@@ -172,17 +172,28 @@ impl Control {
 
     /// Publishes the settings of the next scan, also during a scan.
     fn publish(&self) {
-        self.state.published.send_modify(|published| {
-            published.next = self.scan_settings();
-            if self.settings.simulated.is_some() {
-                // A simulated robot moves immediately.
-                published.now = self.scan_settings();
-            }
-            published.scanning = self.scanning.clone();
-            (published.paused, published.requested) =
-                (self.schedule.is_paused(), self.schedule.requested());
-            published.configuration = self.configuration.clone();
-        });
+        // A simulated robot moves immediately.
+        let in_force = self.settings.simulated.as_ref().map(|_| StateEvent::SettingsInForce);
+        self.state.apply([self.snapshot()].into_iter().chain(in_force));
+    }
+
+    /// Settings of the next scan, schedule and configuration, as an event.
+    pub(super) fn snapshot(&self) -> StateEvent {
+        StateEvent::Control(Box::new(ControlSnapshot {
+            next: self.scan_settings(),
+            scanning: self.scanning.clone(),
+            paused: self.schedule.is_paused(),
+            requested: self.schedule.requested(),
+            configuration: self.configuration.clone(),
+        }))
+    }
+
+    /// Time of the next scheduled scan, as an event.
+    pub(super) fn next_scan_at(&self) -> StateEvent {
+        StateEvent::NextScanAt(match self.schedule.due(self.now()) {
+            Due::At(at) => Some(self.epoch + at),
+            Due::Now | Due::OnRequest => None,
+        })
     }
 
     /// Carries out orders until an interrupt for the device task. Cancel-safe.

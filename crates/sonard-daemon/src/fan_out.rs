@@ -7,7 +7,12 @@ use sonard_log::MAX_LOGGED_SCENE_BYTES;
 use sonard_records::{Event, EventKind, Record, ScanView, Session, Sink, SinkError};
 use tokio::sync::Semaphore;
 
-use super::{broadcast::Hub, fit::explanations, journal::Journal, state::DaemonState};
+use super::{
+    broadcast::Hub,
+    fit::explanations,
+    journal::Journal,
+    state::{DaemonState, StateEvent},
+};
 
 /// Publisher of records to log, subscribers and status.
 #[derive(Clone)]
@@ -71,7 +76,7 @@ impl RecordFanOut {
         let record = Record::Session(Box::new(session.clone()));
         let session = Arc::new(Session { scene_text, ..session });
         // Set before the record is published: followers read the text from the published status.
-        self.state.published.send_modify(|published| published.session = Some(session));
+        self.state.apply([StateEvent::SessionStarted(session)]);
         self.hub.publish(&record);
     }
 }
@@ -79,8 +84,8 @@ impl RecordFanOut {
 impl Sink for RecordFanOut {
     fn record(&mut self, record: &Record) -> Result<(), SinkError> {
         if let Record::ScanStart(start) = record {
-            let running = (start.scan, start.plan.beams());
-            self.state.published.send_modify(|published| published.scan = Some(running));
+            let (scan, beams) = (start.scan, start.plan.beams());
+            self.state.apply([StateEvent::ScanStarted { scan, beams }]);
         }
         self.publish(record);
         Ok(())

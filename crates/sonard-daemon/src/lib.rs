@@ -41,9 +41,8 @@ use std::sync::Arc;
 
 use jiff::Timestamp;
 use sonard_api::{
-    ClockReport, ConfigurationReport, Health, InForce, LinkState, MqttReport, RosReport,
-    ScanRequest, ScanTotals, ServerReport, Setup, SimulationReport, Started, Status,
-    SubscriberReport,
+    ConfigurationReport, Health, InForce, LinkState, MqttReport, RosReport, ScanRequest,
+    ServerReport, Setup, SimulationReport, Started, Status, SubscriberReport,
 };
 use sonard_device::host_gpio::{HostGpio, NoHostGpio};
 use sonard_model::scene::Scene;
@@ -78,7 +77,7 @@ use control::Control;
 use device_task::DeviceTask;
 use fan_out::RecordFanOut;
 use simulated_array::SimulatedArray;
-use state::{DaemonState, PublishedStatus, ScanSettings};
+use state::{ControlSnapshot, DaemonState, LinkSnapshot, PublishedStatus, ScanSettings};
 
 /// Maximum number of queued orders while one is carried out.
 const MAX_QUEUED_ORDERS: usize = 64;
@@ -283,26 +282,26 @@ impl Handle {
     /// Current scene, if there is one.
     #[must_use]
     pub fn scene(&self) -> Option<Arc<Scene>> {
-        self.state.published.borrow().current().scene.clone()
+        self.state.published().current().scene.clone()
     }
 
     /// Current setup of scans by the configuration, and the pending one of the next scan.
     #[must_use]
     pub fn setup(&self) -> InForce<Setup> {
-        let now = (*self.state.published.borrow().current().setup).clone();
+        let now = (*self.state.published().current().setup).clone();
         InForce { now, pending: self.status().pending.setup }
     }
 
     /// Settings of the next scan.
     #[must_use]
     pub fn next_scan(&self) -> NextScan {
-        self.state.published.borrow().next_scan(Instant::now())
+        self.state.published().next_scan(Instant::now())
     }
 
     /// Current session of the log, once there was a scan.
     #[must_use]
     pub fn session(&self) -> Option<Arc<Session>> {
-        self.state.published.borrow().session.clone()
+        self.state.published().session.clone()
     }
 
     /// Supervisor of the daemon's long-lived tasks.
@@ -335,7 +334,7 @@ fn first_status(settings: &Settings) -> PublishedStatus {
         array: settings.simulated.as_ref().map(|simulated| Arc::clone(&simulated.array)),
         air: AirControl::new(settings.keys.air.clone()),
     };
-    PublishedStatus {
+    let link = LinkSnapshot {
         state: LinkState::Opening,
         since: Timestamp::now(),
         changed: Instant::now(),
@@ -343,25 +342,19 @@ fn first_status(settings: &Settings) -> PublishedStatus {
         trouble: None,
         failures: 0,
         retry_at: None,
-        device: None,
         identity: None,
+        device: None,
         provenance: None,
+    };
+    let control = ControlSnapshot {
+        next: scan_settings,
         scanning: settings.keys.scanning.clone(),
-        session: None,
         paused: false,
         requested: 0,
-        next_at: None,
-        scan: None,
-        now: scan_settings.clone(),
-        next: scan_settings,
         configuration: ConfigurationReport::default(),
-        line: state::LinkFigures::default(),
-        scans: ScanTotals::default(),
-        clock: ClockReport::default(),
-        // Set from the first status on: a simulation must never be mistaken for a ranger.
-        simulation: settings
-            .simulated
-            .as_ref()
-            .map(|simulated| SimulationReport::new(&simulated.array)),
-    }
+    };
+    // Reported from the first status on: a simulation must never be mistaken for a ranger.
+    let simulation = settings.simulated.as_ref();
+    let simulation = simulation.map(|simulated| SimulationReport::new(&simulated.array));
+    PublishedStatus::new(link, control, simulation)
 }

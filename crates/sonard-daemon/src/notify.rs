@@ -34,13 +34,13 @@ pub(super) async fn run(state: Arc<DaemonState>, shutdown: CancellationToken) {
     let watchdog = watchdog_enabled();
     let mut tick =
         interval(watchdog.map_or(EXTENSION_INTERVAL, |limit| (limit / 3).min(EXTENSION_INTERVAL)));
-    let mut changes = state.published.subscribe();
+    let mut changes = state.subscribe();
     let (mut ready, mut notified, mut beats) = (false, None, None);
     loop {
         let (link, is_identified, trouble) = {
             let published = changes.borrow_and_update();
-            let is_identified = published.device.is_some() || published.simulation.is_some();
-            (published.state, is_identified, published.trouble.clone())
+            let is_identified = published.link.device.is_some() || published.simulation.is_some();
+            (published.link.state, is_identified, published.link.trouble.clone())
         };
         if is_identified && !std::mem::replace(&mut ready, true) {
             manager.notify(&[NotifyState::Ready]);

@@ -8,10 +8,10 @@
 mod firing_grid;
 mod simulation;
 
-use std::{ops::ControlFlow, time::Duration};
+use std::{ops::ControlFlow, sync::Arc, time::Duration};
 
 use jiff::Timestamp;
-use sonard_api::{LinkState, ScanTotals, SimulationReport};
+use sonard_api::{LinkState, ScanTotals};
 use sonard_model::geometry::Pose;
 use sonard_records::{
     EventKind, Ping, Provenance, Record, STOPPED_ON_REQUEST, ScanEnd, ScanStart, Session, Sink as _,
@@ -23,6 +23,7 @@ use super::{
     control::{Control, Interrupt},
     fan_out::RecordFanOut,
     schedule::Due,
+    state::{LinkSnapshot, StateEvent},
 };
 use firing_grid::FiringGrid;
 use simulation::{RobotMotion, Simulation};
@@ -174,13 +175,8 @@ impl SimulatedArray {
         let ping = Ping { scan: round.scan, index, pose, time: Some(time), ..reading };
         let delay_s = ping.tof_us.map_or_else(|| simulation.window_s(), |tof_us| tof_us * 1e-6);
         sleep_until(slot + Duration::from_secs_f64(delay_s.max(0.0))).await;
-        self.out.state.published.send_modify(|published| {
-            let readings = published.simulation.as_mut().map(|report| &mut report.readings);
-            if let Some(reading) = readings.and_then(|readings| readings.get_mut(ranger)) {
-                (reading.time, reading.status) = (ping.time, Some(ping.status));
-                reading.range_m = ping.range_m;
-            }
-        });
+        let Ping { time, status, range_m, .. } = ping;
+        self.out.state.apply([StateEvent::RangerFired { ranger, time, status, range_m }]);
         self.put(&Record::Ping(Box::new(ping)));
         true
     }
@@ -244,7 +240,7 @@ impl SimulatedArray {
     }
 
     fn count(&mut self, [beams, missing]: [u32; 2]) {
-        self.out.state.published.send_modify(|published| published.scan = None);
+        self.out.state.apply([StateEvent::ScanEnded]);
         *if missing > 0 { &mut self.scans.stopped } else { &mut self.scans.completed } += 1;
         self.scans.beams += u64::from(beams);
         self.scans.missing += u64::from(missing);
@@ -263,35 +259,32 @@ impl SimulatedArray {
 
     /// Publishes the current status and settings.
     fn publish_status(&mut self) {
-        let next_at = match self.control.schedule.due(self.control.now()) {
-            Due::At(at) => Some(self.control.epoch + at),
-            Due::Now | Due::OnRequest => None,
-        };
-        let (control, motion, firing_grid) = (&self.control, &self.motion, &self.firing_grid);
-        self.out.state.published.send_modify(|published| {
-            (published.state, published.since, published.changed) =
-                (self.state, self.since, self.changed);
-            published.provenance = Some(Provenance::Simulated);
+        let control = &self.control;
+        let link = LinkSnapshot {
+            state: self.state,
+            since: self.since,
+            changed: self.changed,
             // A configured port is not opened.
-            published.port.clear();
-            published.scanning = control.scanning.clone();
-            (published.paused, published.requested) =
-                (control.schedule.is_paused(), control.schedule.requested());
-            published.next_at = next_at;
-            (published.now, published.next) = (control.scan_settings(), control.scan_settings());
-            published.configuration = control.configuration.clone();
-            published.scans = self.scans;
-            let report = control.settings.simulated.as_ref().map(|simulated| {
-                let array = &simulated.array;
-                let now = SimulationReport::new(array);
-                let before =
-                    published.simulation.take().filter(|report| report.matches_array(array));
-                let readings = before.map_or(now.readings, |before| before.readings);
-                let (driving, skipped) = (motion.is_driving(), firing_grid.skipped());
-                SimulationReport { driving, skipped, readings, ..now }
-            });
-            published.simulation = report;
+            port: String::new(),
+            trouble: None,
+            failures: 0,
+            retry_at: None,
+            identity: None,
+            device: None,
+            provenance: Some(Provenance::Simulated),
+        };
+        let simulation = control.settings.simulated.as_ref().map(|simulated| {
+            let array = Arc::clone(&simulated.array);
+            (array, self.motion.is_driving(), self.firing_grid.skipped())
         });
+        self.out.state.apply([
+            StateEvent::Link(Box::new(link)),
+            control.snapshot(),
+            StateEvent::SettingsInForce,
+            control.next_scan_at(),
+            StateEvent::ScansCounted(self.scans),
+            StateEvent::Simulation(simulation),
+        ]);
     }
 
     fn interval(&self) -> Duration {

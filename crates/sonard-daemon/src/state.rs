@@ -1,178 +1,39 @@
-//! State shared between the daemon's tasks: status published by the device task, scan counters, and
-//! reports of the outputs.
+//! State of the daemon: what its tasks report as [`StateEvent`]s, summaries of scans, and reports of
+//! the outputs. The status of the API is derived from it when it is requested.
+
+mod published;
 
 use std::sync::{
-    Arc, Mutex, MutexGuard, PoisonError,
+    Mutex, MutexGuard, PoisonError,
     atomic::{AtomicU32, AtomicU64, Ordering},
 };
 
-use firmware_protocol::{host::LinkStats, messages::Identity};
 use jiff::Timestamp;
 use sonard_api::{
-    AirStatus, ClockReport, ConfigurationReport, Health, LineTotals, LinkReport, LinkState,
-    LogStatus, MqttReport, Pending, RosReport, ScanFit, ScanProgress, ScanTotals, ScanningReport,
-    SensorFigures, ServerReport, Setup, SimulationReport, Status, SubscriberReport,
-    config::ScanningKeys,
+    AirStatus, Health, LinkReport, LogStatus, MqttReport, RosReport, ScanFit, ScanProgress,
+    ScanningReport, SensorFigures, ServerReport, Status, SubscriberReport,
 };
 use sonard_interpret::compare::Explanation;
-use sonard_model::{array::RangerArray, geometry::Pose, scene::Scene};
-use sonard_records::{
-    AirSource, Device, Provenance, Record, ScanEnd, ScanPlan, ScanView, SceneRef, Session,
-};
+use sonard_records::{AirSource, Record, ScanEnd, ScanView, SceneRef};
 use sonard_runtime::messages;
 use tokio::{sync::watch, time::Instant};
 use uuid::Uuid;
 
-use super::{
-    air::AirControl,
-    fit::{FitAccumulator, describe_change},
+pub use published::NextScan;
+pub(super) use published::{
+    ControlSnapshot, LinkFigures, LinkSnapshot, PublishedStatus, ScanSettings, StateEvent,
 };
 
-/// Status published by the device task. Ages and waits are computed when the status is read.
-#[derive(Debug, Clone)]
-pub(super) struct PublishedStatus {
-    pub(super) state: LinkState,
-    pub(super) since: Timestamp,
-    /// Time of `since` on the monotonic clock.
-    pub(super) changed: Instant,
-    pub(super) port: String,
-    pub(super) trouble: Option<String>,
-    pub(super) failures: u32,
-    pub(super) retry_at: Option<Instant>,
-    pub(super) device: Option<Device>,
-    pub(super) identity: Option<Identity>,
-    pub(super) provenance: Option<Provenance>,
-    pub(super) scanning: ScanningKeys,
-    pub(super) session: Option<Arc<Session>>,
-    pub(super) paused: bool,
-    pub(super) requested: u32,
-    pub(super) next_at: Option<Instant>,
-    pub(super) scan: Option<(Uuid, u32)>,
-    /// Settings of the running scan, without those of its own request.
-    pub(super) now: ScanSettings,
-    /// Settings of the next scan.
-    pub(super) next: ScanSettings,
-    pub(super) configuration: ConfigurationReport,
-    pub(super) line: LinkFigures,
-    pub(super) scans: ScanTotals,
-    pub(super) clock: ClockReport,
-    pub(super) simulation: Option<SimulationReport>,
-}
+use super::fit::{FitAccumulator, describe_change};
 
-/// Settings of the next scan.
-#[derive(Debug, Clone)]
-pub struct NextScan {
-    /// Azimuths of the beams.
-    pub plan: ScanPlan,
-    /// Position and heading of the ranger.
-    pub pose: Pose,
-    /// Scene of the predictions, if there is one.
-    pub scene: Option<Arc<Scene>>,
-    /// Sensor, model and motion.
-    pub setup: Arc<Setup>,
-    /// Temperature, humidity, pressure and speed of sound.
-    pub air: AirStatus,
-    /// Simulated array, if the readings come from the model.
-    pub array: Option<Arc<RangerArray>>,
-    /// Connected device, for its limits.
-    pub device: Option<Identity>,
-}
-
-/// Settings of a scan: azimuths, pose, scene, sensor and air.
-#[derive(Debug, Clone)]
-pub(super) struct ScanSettings {
-    pub(super) plan: ScanPlan,
-    pub(super) pose: Pose,
-    pub(super) scene: Option<Arc<Scene>>,
-    pub(super) setup: Arc<Setup>,
-    /// Simulated array, if the readings come from the model.
-    pub(super) array: Option<Arc<RangerArray>>,
-    pub(super) air: AirControl,
-}
-
-impl ScanSettings {
-    /// Returns `true` if both settings describe the same scan. The air is ignored, since it may
-    /// change at any time.
-    pub(super) fn same_scan_as(&self, other: &Self) -> bool {
-        let scene = |settings: &Self| settings.scene.as_ref().map(Arc::as_ptr);
-        (self.plan, self.pose, scene(self)) == (other.plan, other.pose, scene(other))
-            && Arc::ptr_eq(&self.setup, &other.setup)
-    }
-}
-
-impl PublishedStatus {
-    /// Current settings: those of the running scan, otherwise those of the next one.
-    pub(super) const fn current(&self) -> &ScanSettings {
-        if self.scan.is_some() { &self.now } else { &self.next }
-    }
-
-    pub(super) fn next_scan(&self, at: Instant) -> NextScan {
-        let ScanSettings { plan, pose, scene, setup, array, air } = self.next.clone();
-        let (air, device) = (air.status(at), self.identity);
-        NextScan { plan, pose, scene, setup, air, array, device }
-    }
-
-    /// Settings of the next scan that differ from the current ones.
-    fn pending(&self, at: Instant) -> Pending {
-        let (now, next) = (self.current(), &self.next);
-        let hash =
-            |settings: &ScanSettings| settings.scene.as_ref().map(|scene| scene.sha256.clone());
-        let scene = next.scene.as_deref().filter(|_| hash(now) != hash(next));
-        Pending {
-            plan: Some(next.plan).filter(|plan| *plan != now.plan),
-            pose: Some(next.pose).filter(|pose| *pose != now.pose),
-            scene: scene.map(SceneRef::from_scene),
-            air: next.air.differs(&now.air).then(|| next.air.status(at)),
-            sensor: Some(&next.setup.sensor)
-                .filter(|sensor| **sensor != now.setup.sensor)
-                .map(SensorFigures::from_sensor),
-            setup: Some(&next.setup).filter(|setup| **setup != now.setup).map(|s| (**s).clone()),
-        }
-    }
-}
-
-/// Counters of the serial line: totals of closed connections, and the open connection.
-#[derive(Debug, Clone, Default)]
-pub(super) struct LinkFigures {
-    /// Totals of closed connections, and the number of losses.
-    pub(super) earlier: LineTotals,
-    /// Live counters of the open connection.
-    pub(super) live: Option<watch::Receiver<LinkStats>>,
-}
-
-impl LinkFigures {
-    /// Current totals of all connections.
-    pub(super) fn totals(&self) -> LineTotals {
-        self.live.as_ref().map_or(self.earlier, |live| add_stats(self.earlier, &live.borrow()))
-    }
-
-    /// Adds the counters of the open connection to the totals when it is closed.
-    pub(super) fn close(&mut self) {
-        *self = Self { earlier: self.totals(), live: None };
-    }
-}
-
-/// Adds the counters of a connection to the totals.
-fn add_stats(mut totals: LineTotals, stats: &LinkStats) -> LineTotals {
-    let dropped = &stats.dropped;
-    totals.bytes_sent += stats.bytes_sent;
-    totals.bytes_received += stats.bytes_received;
-    totals.frames_received += stats.frames_received;
-    totals.crc_errors += u64::from(dropped.checksum);
-    totals.framing_errors += u64::from(dropped.stuffing) + u64::from(dropped.too_long);
-    totals.retries += stats.retries;
-    totals.repaired += stats.repaired;
-    totals.rejected += stats.rejected;
-    totals
-}
-
-/// State shared between the daemon's tasks.
+/// State of the daemon, shared between its tasks.
 #[derive(Debug)]
 pub(super) struct DaemonState {
     pub(super) started: Instant,
     /// Name of the robot, fixed at the start.
     pub(super) robot: String,
-    pub(super) published: watch::Sender<PublishedStatus>,
+    /// Changed by [`Self::apply`] only.
+    published: watch::Sender<PublishedStatus>,
     /// Heartbeats of the device task, which the watchdog of systemd examines.
     beats: AtomicU64,
     beams_done: AtomicU32,
@@ -223,6 +84,23 @@ impl DaemonState {
         }
     }
 
+    /// Applies events in order; subscribers see all of them or none.
+    pub(super) fn apply(&self, events: impl IntoIterator<Item = StateEvent>) {
+        self.published.send_modify(|published| {
+            events.into_iter().for_each(|event| published.apply(event));
+        });
+    }
+
+    /// Current status of link, settings and session.
+    pub(super) fn published(&self) -> watch::Ref<'_, PublishedStatus> {
+        self.published.borrow()
+    }
+
+    /// Subscribes to changes of the status.
+    pub(super) fn subscribe(&self) -> watch::Receiver<PublishedStatus> {
+        self.published.subscribe()
+    }
+
     /// Counts a heartbeat of the device task.
     pub(super) fn beat(&self) {
         self.beats.fetch_add(1, Ordering::Relaxed);
@@ -236,7 +114,7 @@ impl DaemonState {
     /// unless there were too many to keep.
     pub(super) fn update(&self, record: &Record) -> Option<(Uuid, Option<ScanView>)> {
         self.beat();
-        let session = self.published.borrow().session.clone();
+        let session = self.published().session.clone();
         let mut scans = self.scans();
         match record {
             Record::ScanStart(start) => {
@@ -295,30 +173,31 @@ impl DaemonState {
         let now = Instant::now();
         let until =
             |at: Option<Instant>| at.map(|at| at.saturating_duration_since(now).as_secs_f64());
-        let published = self.published.borrow().clone();
+        let published = self.published().clone();
         let (current, pending) = (published.current().clone(), published.pending(now));
+        let PublishedStatus { link, control, .. } = published.clone();
         Status {
             robot: self.robot.clone(),
             sonard: env!("CARGO_PKG_VERSION").into(),
             uptime_s: now.duration_since(self.started).as_secs_f64(),
             link: LinkReport {
-                state: published.state,
-                since: published.since,
-                for_s: Some(now.saturating_duration_since(published.changed).as_secs_f64()),
-                port: published.port,
-                error: published.trouble,
-                failures: published.failures,
-                retry_in_s: until(published.retry_at),
+                state: link.state,
+                since: link.since,
+                for_s: Some(now.saturating_duration_since(link.changed).as_secs_f64()),
+                port: link.port,
+                error: link.trouble,
+                failures: link.failures,
+                retry_in_s: until(link.retry_at),
                 latency_timer_ms: Some(self.latency_timer_ms.load(Ordering::Relaxed))
                     .filter(|ms| *ms > 0),
             },
-            device: published.device,
-            provenance: published.provenance,
+            device: link.device,
+            provenance: link.provenance,
             scanning: ScanningReport {
-                mode: published.scanning.mode,
-                every_s: published.scanning.every_s,
-                paused: published.paused,
-                requested: published.requested,
+                mode: control.scanning.mode,
+                every_s: control.scanning.every_s,
+                paused: control.paused,
+                requested: control.requested,
                 next_in_s: until(published.next_at),
             },
             last_reading_age_s: self
@@ -341,19 +220,20 @@ impl DaemonState {
             server: lock(&self.server).clone(),
             ros: lock(&self.ros).clone(),
             mqtt: lock(&self.mqtt).clone(),
-            configuration: published.configuration,
+            configuration: control.configuration,
             simulation: published.simulation,
         }
     }
 
     pub(super) fn health(&self, log: &LogStatus) -> Health {
-        let published = self.published.borrow().clone();
+        let published = self.published().clone();
         // The current air would be that of the scan's start; health reports the last temperature.
-        let air = published.next.air.status(Instant::now());
+        let air = published.control.next.air.status(Instant::now());
         let mut reasons = Vec::new();
-        if !published.state.is_up() {
-            let trouble = published.trouble.unwrap_or_default();
-            reasons.push(format!("the link is {}: {trouble}", published.state.name()));
+        let link = published.link;
+        if !link.state.is_up() {
+            let trouble = link.trouble.unwrap_or_default();
+            reasons.push(format!("the link is {}: {trouble}", link.state.name()));
         }
         reasons.extend(log.error.iter().map(|error| format!("the log: {error}")));
         reasons.extend(log.incident.iter().map(|incident| format!("the log: {incident}")));

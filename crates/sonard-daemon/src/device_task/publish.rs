@@ -5,7 +5,10 @@ use sonard_api::{LinkState, Trouble};
 use sonard_device::ranger::{device_record, provenance};
 use sonard_records::EventKind;
 
-use super::{super::schedule::Due, DeviceTask};
+use super::{
+    super::state::{LinkSnapshot, StateEvent},
+    DeviceTask,
+};
 
 impl DeviceTask {
     /// Publishes the current status, and logs a change of link state once.
@@ -20,32 +23,27 @@ impl DeviceTask {
             - SignedDuration::try_from(self.control.now().saturating_sub(self.machine.since()))
                 .unwrap_or_default();
         let changed = self.control.epoch + self.machine.since();
-        let next_at = match self.control.schedule.due(self.control.now()) {
-            Due::At(at) => Some(self.control.epoch + at),
-            Due::Now | Due::OnRequest => None,
-        };
-        let retry_at = self.machine.retry_at().map(|at| self.control.epoch + at);
         let (control, machine) = (&self.control, &self.machine);
-        self.out.state.published.send_modify(|published| {
-            if published.state != machine.state() {
-                (published.since, published.changed) = (since, changed);
-            }
-            published.state = machine.state();
-            published.port = control.settings.keys.device.port.clone().unwrap_or_default();
-            published.trouble.clone_from(&self.trouble);
-            (published.failures, published.retry_at) = (machine.failures(), retry_at);
-            published.device = control.identity.as_ref().map(device_record);
-            published.identity = control.identity;
-            published.provenance = control.identity.as_ref().map(provenance);
-            published.scanning = control.scanning.clone();
-            (published.paused, published.requested) =
-                (control.schedule.is_paused(), control.schedule.requested());
-            published.next_at = next_at;
-            (published.now, published.next) = (control.scan_settings(), control.scan_settings());
-            published.configuration = control.configuration.clone();
-            published.line.clone_from(&self.line_figures);
-            published.scans = self.scans;
-        });
+        let link = LinkSnapshot {
+            state: machine.state(),
+            since,
+            changed,
+            port: control.settings.keys.device.port.clone().unwrap_or_default(),
+            trouble: self.trouble.clone(),
+            failures: machine.failures(),
+            retry_at: machine.retry_at().map(|at| control.epoch + at),
+            identity: control.identity,
+            device: control.identity.as_ref().map(device_record),
+            provenance: control.identity.as_ref().map(provenance),
+        };
+        self.out.state.apply([
+            StateEvent::Link(Box::new(link)),
+            control.snapshot(),
+            StateEvent::SettingsInForce,
+            control.next_scan_at(),
+            StateEvent::LineCounted(Box::new(self.line_figures.clone())),
+            StateEvent::ScansCounted(self.scans),
+        ]);
         self.control.gpio.set_light(self.machine.state().is_up());
     }
 

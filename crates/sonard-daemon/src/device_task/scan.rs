@@ -12,7 +12,8 @@ use uuid::Uuid;
 
 use super::{
     super::{
-        control::Interrupt, link_state::LinkInput, prediction_cache::predict, schedule::QueuedScans,
+        control::Interrupt, link_state::LinkInput, prediction_cache::predict,
+        schedule::QueuedScans, state::StateEvent,
     },
     DeviceTask, with_orders,
 };
@@ -40,7 +41,7 @@ impl DeviceTask {
         self.control.identity = Some(*ranger.identity());
         self.ranger = Some(ranger);
         self.next_check = Instant::now() + self.check_interval();
-        self.out.state.published.send_modify(|published| published.scan = None);
+        self.out.state.apply([StateEvent::ScanEnded]);
         self.finish_scan(previous, outcome);
         interrupts.into_iter().for_each(|interrupt| self.react(interrupt));
     }
@@ -141,10 +142,7 @@ impl DeviceTask {
     fn count_clock_steps(&self, steps: u32) {
         if steps > 0 {
             tracing::warn!("the computer's clock was stepped; the log contains the offset");
-            self.out
-                .state
-                .published
-                .send_modify(|published| published.clock.steps += u64::from(steps));
+            self.out.state.apply([StateEvent::ClockStepped(steps)]);
         }
     }
 
@@ -238,8 +236,6 @@ impl DeviceTask {
         self.scans.restarts += u64::from(summary.restarts);
         let drift_ppm = summary.clock_drift.map(|drift| drift * 1e6);
         let sigma_us = self.out.state.latest_end().and_then(|(_, sigma_us)| sigma_us);
-        self.out.state.published.send_modify(|published| {
-            (published.clock.drift_ppm, published.clock.sigma_us) = (drift_ppm, sigma_us);
-        });
+        self.out.state.apply([StateEvent::ClockMeasured { drift_ppm, sigma_us }]);
     }
 }
