@@ -237,6 +237,8 @@ fn past_scans_and_beams() {
     assert_eq!(daemon.get("/v1/scans").json(), json!([]));
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":2}"#).status, 202);
     daemon.wait_for_scans(2);
+    // The last scan can be read once it is in the log.
+    daemon.wait_until("the log", || daemon.get("/v1/scan/latest").status == 200);
     let latest = daemon.get("/v1/scan/latest").json();
     let scans = daemon.get("/v1/scans?limit=1").json();
     assert_eq!(scans.as_array().map(Vec::len), Some(1));

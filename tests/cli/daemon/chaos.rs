@@ -281,7 +281,7 @@ fn random_faults_lose_no_reading() {
     wait_until("scans", || scans(&chaos.daemon) > before);
     is_over.store(true, Ordering::Relaxed);
     chaos.daemon.signal(Signal::TERM);
-    let code = chaos.daemon.child.wait().expect("it ends").code();
+    let code = chaos.daemon.wait();
     assert_eq!(code, Some(0), "{}", chaos.daemon.messages());
     follower.join().expect("no panic");
     let messages = chaos.daemon.messages();

@@ -29,6 +29,7 @@ fn unplugged_ranger() {
     wait_until("beams", || daemon.status()["scan"]["done"].as_u64() >= Some(3));
     rig.unplug();
     daemon.wait_for("absent");
+    wait_until("the message", || daemon.messages().matches("absent: ").count() == 2);
     // The absence is reported once.
     let printed = daemon.messages().lines().count();
     std::thread::sleep(Duration::from_secs(3));

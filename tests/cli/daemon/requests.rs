@@ -138,17 +138,23 @@ fn requested_air_is_reset() {
 fn wait_is_interruptible() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &SHORT);
-    let own = ["--scene", "simple-room", "--pose", "fig9", "--repeat", "50"];
+    // Scans take so long that the first one is running when it is ended.
+    let own = ["--scene", "simple-room", "--pose", "fig9", "--step-deg", "0.9", "--repeat", "50"];
     for by_stop in [false, true] {
-        let child = scan(&daemon, &own).spawn().expect("it runs");
-        wait_until("a scan", || daemon.status()["scan"]["done"].as_u64() > Some(3));
+        let mut child = scan(&daemon, &own).spawn().expect("it runs");
+        let mut notices = BufReader::new(child.stderr.take().expect("piped")).lines();
+        let mut is_started =
+            || notices.any(|line| line.expect("text").contains("scan 1 of 50 started"));
+        assert!(is_started());
+        wait_until("beams", || daemon.status()["scan"]["done"].as_u64() > Some(3));
         if by_stop {
             assert_eq!(daemon.send("POST", "/v1/stop", "").status, 202);
         } else {
             interrupt(child.id());
         }
+        let rest: Vec<String> = notices.map(|line| line.expect("text")).collect();
         let output = child.wait_with_output().expect("it ends");
-        assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+        assert_eq!(output.status.code(), Some(1), "{rest:?}");
         let log = Log::parse(&String::from_utf8_lossy(&output.stdout));
         assert!(log.end()["missing"].as_u64() > Some(0), "the scan was closed");
         wait_until("rest", || daemon.status()["scan"].is_null());

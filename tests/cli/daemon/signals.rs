@@ -59,7 +59,7 @@ fn repeated_signals_are_merged() {
         if daemon.child.try_wait().expect("it is ours").is_none() {
             kill_process(pid, second).expect("it runs");
         }
-        let code = daemon.child.wait().expect("it ends").code();
+        let code = daemon.wait();
         assert_eq!(code, Some(0), "{first:?}, {second:?} after {gap_ms} ms: {}", daemon.messages());
         assert_closed(folder.path());
     }
@@ -82,7 +82,7 @@ fn second_signal_forces_the_end() {
     if daemon.child.try_wait().expect("it is ours").is_none() {
         daemon.signal(Signal::TERM);
     }
-    let code = daemon.child.wait().expect("it ends").code();
+    let code = daemon.wait();
     assert!(matches!(code, Some(0 | 1)), "{code:?}: {}", daemon.messages());
     drop(silent);
     assert_closed(folder.path());
@@ -123,7 +123,7 @@ fn closed_terminal_stops_daemon() {
     let mut daemon = Daemon::from_child(child, folder.path());
     wait_until("beams", || daemon.status()["scan"]["done"].as_u64() >= Some(2));
     drop(terminal);
-    assert_eq!(daemon.child.wait().expect("it ends").code(), Some(0));
+    assert_eq!(daemon.wait(), Some(0));
     assert_closed(folder.path());
 }
 

@@ -8,6 +8,7 @@ use std::{
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
     sync::{Arc, Mutex},
+    thread::JoinHandle,
     time::Duration,
 };
 
@@ -33,6 +34,8 @@ pub struct Daemon {
     pub child: Child,
     pub folder: PathBuf,
     printed: Arc<Mutex<String>>,
+    /// Thread that reads standard error.
+    reader: Option<JoinHandle<()>>,
 }
 
 /// An answer.
@@ -83,18 +86,18 @@ impl Daemon {
         let printed = Arc::new(Mutex::new(String::new()));
         let lines = BufReader::new(child.stderr.take().expect("piped"));
         let received = Arc::clone(&printed);
-        std::thread::spawn(move || {
+        let reader = std::thread::spawn(move || {
             for line in lines.lines().map_while(Result::ok) {
                 *received.lock().expect("no panic") += &(line + "\n");
             }
         });
-        Self { child, folder: folder.into(), printed }
+        Self { child, folder: folder.into(), printed, reader: Some(reader) }
     }
 
     /// A daemon that was started with `--log` and `--socket` as [`spawn`](Self::spawn) does, and whose standard error
     /// belongs to the test.
     pub fn from_child(child: Child, folder: &Path) -> Self {
-        let daemon = Self { child, folder: folder.into(), printed: Arc::default() };
+        let daemon = Self { child, folder: folder.into(), printed: Arc::default(), reader: None };
         wait_until("the API", || daemon.connect().is_ok());
         daemon
     }
@@ -163,7 +166,14 @@ impl Daemon {
     /// Ends it as systemd does, and returns its exit code.
     pub fn stop(mut self) -> Option<i32> {
         self.signal(Signal::TERM);
-        self.child.wait().expect("it ends").code()
+        self.wait()
+    }
+
+    /// Waits for the end of the process and of its messages; returns its code.
+    pub fn wait(&mut self) -> Option<i32> {
+        let code = self.child.wait().expect("it ends").code();
+        self.reader.take().into_iter().for_each(|reader| reader.join().expect("no panic"));
+        code
     }
 
     /// Ends it as a power cut does.
