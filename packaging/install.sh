@@ -83,7 +83,7 @@ install() {
   elif [ -e "$prefix/bin/sonard" ]; then
     fail "$prefix/bin/sonard is there, but not from this script: remove it, or name another folder by --prefix"
   fi
-  mkdir -p "$prefix/share/sonard" "$prefix/bin" || fail "$prefix is not writable; --prefix names another folder"
+  mkdir -p "$prefix/share/sonard" "$prefix/bin" 2>/dev/null || fail "$prefix is not writable; --prefix names another folder"
   (cd "$work/$name" && find . -type f | sed 's|^\./||' | sort) >"$list"
   cp -R "$work/$name/." "$prefix/"
   printf 'installed %s in %s\n' "$name" "$prefix"

@@ -65,15 +65,27 @@ END
   timed within "$root" setpriv --reuid user --regid user --clear-groups env HOME=/home/user sh /first.sh
   [ -s "$root/home/user/out/fig9/scan.png" ] || fail "no picture: $(cat "$work/output")"
   row "$platform" "install.sh, then the first scan" "$took" "$(megabytes "$archive")" no
-  chroot "$root" setpriv --reuid user --regid user --clear-groups env HOME=/home/user \
-    sh -c 'rm -r "$HOME/out" && sh /dist/install.sh --uninstall && rmdir "$HOME/.local" 2>/dev/null || true'
+  as_user() { chroot "$root" setpriv --reuid user --regid user --clear-groups env HOME=/home/user "$@"; }
+  # rejects PART OPTION...: the installer fails with a message that contains PART.
+  rejects() {
+    local part=$1
+    shift
+    if as_user sh /dist/install.sh "$@" >"$work/output" 2>&1; then fail "install.sh $* succeeds"; fi
+    grep -q -- "$part" "$work/output" || fail "install.sh $*: $(cat "$work/output")"
+  }
+  as_user sh /dist/install.sh >/dev/null
+  as_user /home/user/.local/bin/sonard --version >/dev/null || fail "a second installation breaks the first"
+  rejects 'no SHA256SUMS' --from /nowhere
+  rejects 'not writable' --prefix /opt
+  rejects 'nothing is installed' --prefix /opt --uninstall
+  mkdir -p "$root/other/bin"
+  touch "$root/other/bin/sonard"
+  rejects 'not from this script' --prefix /other
+  as_user sh -c 'rm -r "$HOME/out" && sh /dist/install.sh --uninstall && rmdir "$HOME/.local" 2>/dev/null || true'
   chroot "$root" find /home/user | sort | diff "$work/before" - || fail "uninstalling leaves files"
   # A changed archive is rejected.
   printf x >>"$root/dist/$(basename "$archive")"
-  if chroot "$root" env HOME=/home/user sh /dist/install.sh --from /dist >"$work/output" 2>&1; then
-    fail "a changed archive is installed"
-  fi
-  grep -q 'digest' "$work/output" || fail "$(cat "$work/output")"
+  rejects 'digest' --from /dist
 }
 
 # A root with nothing but the static program.
