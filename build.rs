@@ -3,6 +3,6 @@
 fn main() {
     sonard_build::emit(sonard_build::Package {
         folder: "",
-        features: &["daemon", "pi", "lz4", "mqtt", "ros", "sqlite"],
+        features: &["daemon", "pi", "dxf", "lz4", "manual", "mqtt", "ros", "sqlite"],
     });
 }

@@ -42,7 +42,7 @@ prepare() {
   dev)
     # As tests build it, with the features of the other one.
     folder=debug
-    [ -x "$target/debug/sonard" ] || cargo build --quiet
+    [ -x "$target/debug/sonard" ] || cargo build --quiet --features full
     ;;
   esac
   rm -rf "$target/package"

@@ -13,7 +13,7 @@ glibc_minor=31
 
 fail() { printf 'install.sh: %s\n' "$*" >&2; exit 1; }
 
-from=$(dirname "$0") prefix=${HOME:?}/.local action=install
+from=$(dirname "$0") prefix=${HOME:-}/.local action=install
 while [ $# != 0 ]; do
   case $1 in
   --from) from=${2:?--from: where?} && shift 2 ;;
@@ -23,6 +23,7 @@ while [ $# != 0 ]; do
   *) fail "unknown option $1" ;;
   esac
 done
+case $prefix in /.local) fail "HOME is not set; name a folder: --prefix FOLDER" ;; esac
 list=$prefix/share/sonard/installed
 
 # Removes the files of the list, and the folders that are empty then.
@@ -46,8 +47,8 @@ fetch() {
       wget -q -O "$2" "${from%/}/$1" || fail "cannot fetch $1; install curl or wget"
     fi
     ;;
-  *) cp "$from/$1" "$2" ;;
-  esac || fail "no $1 in $from"
+  *) cp "$from/$1" "$2" 2>/dev/null ;;
+  esac || fail "no $1 in $from; --from names the folder or URL of a release"
 }
 
 # Prints the processor and C library, as the archives' names have them.
@@ -77,8 +78,12 @@ install() {
   found=$(sha256sum "$work/$name.tar.gz")
   [ -n "$expected" ] && [ "${found%% *}" = "$expected" ] || fail "the digest of $name.tar.gz is not that of SHA256SUMS"
   tar -x -z -f "$work/$name.tar.gz" -C "$work"
-  if [ -r "$list" ]; then uninstall; fi
-  mkdir -p "$prefix/share/sonard"
+  if [ -r "$list" ]; then
+    uninstall
+  elif [ -e "$prefix/bin/sonard" ]; then
+    fail "$prefix/bin/sonard is there, but not from this script: remove it, or name another folder by --prefix"
+  fi
+  mkdir -p "$prefix/share/sonard" "$prefix/bin" 2>/dev/null || fail "$prefix is not writable; --prefix names another folder"
   (cd "$work/$name" && find . -type f | sed 's|^\./||' | sort) >"$list"
   cp -R "$work/$name/." "$prefix/"
   printf 'installed %s in %s\n' "$name" "$prefix"

@@ -55,7 +55,7 @@ mod numbers;
 mod online;
 mod options;
 mod output;
-#[cfg(feature = "daemon")]
+#[cfg(feature = "manual")]
 mod package_files;
 mod paths;
 mod picture;

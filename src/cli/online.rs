@@ -2,9 +2,7 @@
 
 use clap::Subcommand;
 
-use super::{
-    Outcome, collect, doctor, mock, package_files, report, run, scan, status, tour, watch,
-};
+use super::{Outcome, collect, doctor, mock, report, run, scan, status, tour, watch};
 
 /// Verb that uses a device, a mock or a daemon.
 #[derive(Debug, Subcommand)]
@@ -35,8 +33,9 @@ pub(super) enum Verb {
     #[command(long_about = report::ABOUT)]
     Report(report::Args),
     /// Write manual pages and shell completions, for packages
+    #[cfg(feature = "manual")]
     #[command(hide = true)]
-    PackageFiles(package_files::Args),
+    PackageFiles(super::package_files::Args),
     /// Drive the ranger from Raspberry Pi GPIO
     #[cfg(feature = "pi")]
     #[command(long_about = super::board::ABOUT)]
@@ -56,7 +55,8 @@ impl Verb {
             Self::Mock(args) => mock::run(&args),
             Self::Doctor(args) => doctor::run(&args),
             Self::Report(args) => report::run(&args),
-            Self::PackageFiles(args) => package_files::run(&args),
+            #[cfg(feature = "manual")]
+            Self::PackageFiles(args) => super::package_files::run(&args),
             #[cfg(feature = "pi")]
             Self::Board(args) => super::board::run(&args),
         }

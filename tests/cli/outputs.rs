@@ -162,7 +162,9 @@ fn run_case(arguments: &str, input: &Path, folder: &Path) -> Output {
 fn every_output_is_tested() {
     let known: BTreeSet<String> = sonard::cli::outputs().into_iter().collect();
     let reported: BTreeSet<String> = CASES.iter().map(|case| case.output.to_owned()).collect();
-    let without: BTreeSet<String> = WITHOUT_INPUT.map(str::to_owned).into();
+    let is_built = |output: &&str| cfg!(feature = "manual") || !output.starts_with("package-files");
+    let without: BTreeSet<String> =
+        WITHOUT_INPUT.into_iter().filter(is_built).map(str::to_owned).collect();
     let mut expected = &reported | &without;
     // A socket is configuration, and no path of the command line alone.
     assert!(expected.remove("run --socket"));

@@ -1,6 +1,8 @@
 //! `sonard scene from-grid`, `from-svg`, `from-dxf` and `from-sdf`.
 
 mod drawings;
+#[cfg(feature = "dxf")]
+mod dxf;
 mod maps;
 mod worlds;
 
@@ -151,152 +153,13 @@ fn walls<'a>(scene: &'a Scene, id: &str) -> Vec<&'a Wall> {
     walls
 }
 
-/// A DXF file of groups, code and value.
-fn dxf(units: &str, layers: &[(&str, i16)], entities: &[&[(i32, &str)]]) -> String {
-    let mut groups: Vec<(i32, String)> = Vec::new();
-    let mut add = |code: i32, value: &str| groups.push((code, value.to_owned()));
-    for (code, value) in [(0, "SECTION"), (2, "HEADER"), (9, "$ACADVER"), (1, "AC1015")] {
-        add(code, value);
-    }
-    for (code, value) in [(9, "$INSUNITS"), (70, units), (0, "ENDSEC")] {
-        add(code, value);
-    }
-    for (code, value) in [(0, "SECTION"), (2, "TABLES"), (0, "TABLE"), (2, "LAYER")] {
-        add(code, value);
-    }
-    for (name, color) in layers {
-        for (code, value) in [(0, "LAYER"), (2, name), (70, "0"), (62, &color.to_string())] {
-            add(code, value);
-        }
-    }
-    for (code, value) in [(0, "ENDTAB"), (0, "ENDSEC"), (0, "SECTION"), (2, "ENTITIES")] {
-        add(code, value);
-    }
-    for (code, value) in entities.iter().copied().flatten() {
-        add(*code, value);
-    }
-    for (code, value) in [(0, "ENDSEC"), (0, "EOF")] {
-        add(code, value);
-    }
-    groups.iter().map(|(code, value)| format!("{code:3}\n{value}\n")).collect()
-}
-
-const ROOM: &[(i32, &str)] = &[
-    (0, "LWPOLYLINE"),
-    (8, "A-WALL"),
-    (90, "4"),
-    (70, "1"),
-    (10, "0"),
-    (20, "0"),
-    (10, "4000"),
-    (20, "0"),
-    (10, "4000"),
-    (20, "3000"),
-    (10, "0"),
-    (20, "3000"),
-];
-/// Half a circle over the wall from (1, 0) to (2, 0), away from the room's inside and towards it.
-const BAY: &[(i32, &str)] = &[
-    (0, "LWPOLYLINE"),
-    (8, "A-BAY"),
-    (90, "2"),
-    (70, "0"),
-    (10, "1000"),
-    (20, "1000"),
-    (42, "1"),
-    (10, "2000"),
-    (20, "1000"),
-];
-const OLD_LINE: &[(i32, &str)] = &[
-    (0, "POLYLINE"),
-    (8, "A-WALL"),
-    (66, "1"),
-    (70, "0"),
-    (0, "VERTEX"),
-    (8, "A-WALL"),
-    (10, "500"),
-    (20, "2000"),
-    (0, "VERTEX"),
-    (8, "A-WALL"),
-    (10, "500"),
-    (20, "2500"),
-    (0, "SEQEND"),
-    (8, "A-WALL"),
-];
-const LINE: &[(i32, &str)] =
-    &[(0, "LINE"), (8, "A-WALL"), (10, "3000"), (20, "500"), (11, "3500"), (21, "500")];
-/// Seen from below: x is mirrored.
-const COLUMN: &[(i32, &str)] = &[
-    (0, "CIRCLE"),
-    (8, "A-COLS"),
-    (10, "-2500"),
-    (20, "2000"),
-    (40, "150"),
-    (210, "0"),
-    (220, "0"),
-    (230, "-1"),
-];
-const ARC: &[(i32, &str)] =
-    &[(0, "ARC"), (8, "A-BAY"), (10, "3000"), (20, "2000"), (40, "500"), (50, "270"), (51, "90")];
-const BLOCK: &[(i32, &str)] = &[(0, "INSERT"), (8, "A-WALL"), (2, "door"), (10, "0"), (20, "0")];
-const HIDDEN: &[(i32, &str)] =
-    &[(0, "LINE"), (8, "A-ANNO"), (10, "0"), (20, "0"), (11, "4000"), (21, "3000")];
-
+#[cfg(not(feature = "dxf"))]
 #[test]
-fn dxf_units() {
+fn dxf_without_the_feature() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("plan.dxf");
-    let drawing = path.to_str().expect("a plain path");
-    let layers = [("A-WALL", 7), ("A-COLS", 3), ("A-BAY", 1), ("A-ANNO", -2)];
-    let all = [ROOM, BAY, OLD_LINE, LINE, COLUMN, ARC, BLOCK, HIDDEN];
-    fs::write(&path, dxf("4", &layers, &all)).expect("writable");
-    let output = run(&["scene", "from-dxf", drawing]);
-    assert!(stderr(&output).contains("ignored: 1 blocks"), "{}", stderr(&output));
-    let scene = made(&["scene", "from-dxf", drawing]);
-    let near =
-        |a: DVec2, x: f64, y: f64| assert!(a.distance((x, y).into()) < 1e-3, "{a} is not {x}, {y}");
-    let room = walls(&scene, "A-WALL-1");
-    assert_eq!(room.len(), 4);
-    near(room[1].b, 4.0, 3.0);
-    // The bulge of a half circle to the right of the way from (1, 1) to (2, 1).
-    let bay = walls(&scene, "A-BAY-2");
-    assert!(bay.len() > 6 && bay.iter().all(|wall| wall.a.y < 1.0 + 1e-9), "{bay:?}");
-    assert!(bay.iter().all(|wall| (wall.b.distance((1.5, 1.0).into()) - 0.5).abs() < 1e-3));
-    near(walls(&scene, "A-WALL-3")[0].b, 0.5, 2.5);
-    near(walls(&scene, "A-WALL-4")[0].a, 3.0, 0.5);
-    let [column] = &scene.cylinders[..] else { panic!("{:?}", scene.cylinders) };
-    near(column.center, 2.5, 2.0);
-    assert_eq!((&*column.id, column.radius_m), ("A-COLS-5", 0.15));
-    let arc = walls(&scene, "A-BAY-6");
-    near(arc[0].a, 3.0, 1.5);
-    near(arc[arc.len() - 1].b, 3.0, 2.5);
-    assert!(arc.iter().all(|wall| wall.a.midpoint(wall.b).x > 3.0), "{arc:?}");
-    // What is switched off counts where it is named, and nothing else does then.
-    let scene = made(&["scene", "from-dxf", drawing, "--layer", "A-ANNO", "--unit-m", "0.01"]);
-    let [wall] = &scene.walls[..] else { panic!("{:?}", scene.walls) };
-    near(wall.b, 40.0, 30.0);
-    refused(&["scene", "from-dxf", drawing, "--layer", "A-WALLS"], "layer `A-WALLS` is empty");
-}
-
-#[test]
-fn unusable_drawings() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let path = folder.path().join("plan.dxf");
-    let drawing = path.to_str().expect("a plain path");
-    // The last has a time that is out of range.
-    let time = dxf("6\n  9\n$TDCREATE\n 40\n1e300", &[], &[LINE]);
-    for (text, part) in [
-        (dxf("0", &[], &[LINE]), "--unit-m"),
-        (dxf("6", &[], &[BLOCK]), "no walls"),
-        (dxf("6", &[], &[LINE]).replace("3500", "wide"), "invalid DXF"),
-        ("hello".to_owned(), "invalid DXF"),
-        (String::new(), "$INSUNITS"),
-        (time, "out of range"),
-    ] {
-        fs::write(&path, text).expect("writable");
-        refused(&["scene", "from-dxf", drawing], part);
-        assert!(!stderr(&run(&["scene", "from-dxf", drawing])).contains("panicked"));
-    }
+    fs::write(&path, "0\nEOF\n").expect("writable");
+    refused(&["scene", "from-dxf", path.to_str().expect("a plain path")], "--features dxf");
 }
 
 const WORLD: &str = r#"<?xml version="1.0"?>

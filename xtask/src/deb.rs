@@ -18,7 +18,7 @@ pub(crate) fn build_all(release: &Release) -> Result<(), Failure> {
     for target in targets {
         release.build_program(target)?;
         let mut package = Command::new(release.target.join("tools/bin/cargo-deb"));
-        package.args(["--no-build", "--no-strip", "--quiet", "--profile", "dist"]);
+        package.args(["--no-build", "--no-strip", "--quiet", "--profile", "shipped"]);
         package.args(["--variant", "dist", "--target", target, "--output"]).arg(&release.dist);
         release.set_environment(&mut package)?;
         run(package.env("CARGO_TARGET_DIR", &release.target))?;

@@ -117,7 +117,7 @@ impl Release {
     /// # Errors
     /// A failed build.
     pub(crate) fn build_program(&self, target: &str) -> Result<PathBuf, Failure> {
-        let built = self.target.join(target).join("dist/sonard");
+        let built = self.target.join(target).join("shipped/sonard");
         if let Some(program) = &self.program {
             fs::create_dir_all(built.parent().ok_or("no folder")?)?;
             fs::copy(program, &built)?;
@@ -130,7 +130,15 @@ impl Release {
             false => target.to_owned(),
         };
         let mut build = Command::new(tools.program("cargo-zigbuild"));
-        build.args(["zigbuild", "--quiet", "--locked", "--profile", "dist", "--package", "sonard"]);
+        build.args([
+            "zigbuild",
+            "--quiet",
+            "--locked",
+            "--profile",
+            "shipped",
+            "--package",
+            "sonard",
+        ]);
         build.args(["--bin", "sonard", "--features", "full", "--target", &zig_target]);
         self.set_environment(&mut build)?;
         build.env("PATH", tools.search_path()).env("CARGO_TARGET_DIR", &self.target);

@@ -1,5 +1,6 @@
 //! Floor plans from file to walls.
 
+#[cfg(feature = "dxf")]
 mod dxf;
 mod sdf;
 mod svg;
@@ -8,7 +9,6 @@ use sonard_model::scene::Scene;
 
 use crate::{
     FloorPlan,
-    dxf::DxfOptions,
     sdf::{NoLibrary, SdfOptions},
     svg::SvgOptions,
 };
@@ -32,7 +32,6 @@ fn large_files_are_rejected() {
     let compressed = encoder.finish().expect("in memory");
     let svg = |bytes: &[u8]| crate::svg::read(bytes, &SvgOptions { width_m: 10.0 });
     for plan in [
-        crate::dxf::read(&large, &DxfOptions::default()),
         svg(&large),
         svg(&compressed),
         crate::sdf::read(&large, &SdfOptions { cut_z_m: 0.3 }, &NoLibrary),

@@ -38,3 +38,10 @@ fn other_files_and_line_ends() {
     let error = dxf::read(small.as_bytes(), &DxfOptions::default()).expect_err("too small");
     assert!(error.help().contains("--unit-m"), "{}", error.help());
 }
+
+#[test]
+fn large_drawings_are_rejected() {
+    let large = vec![b' '; crate::MAX_FILE_BYTES + 1];
+    let error = dxf::read(&large, &DxfOptions::default()).expect_err("too large");
+    assert!(error.to_string().contains("larger than 16 MB"), "{error}");
+}
