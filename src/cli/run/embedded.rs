@@ -21,8 +21,8 @@ use crate::{
     supervisor::{Supervisor, Task},
 };
 
-/// Capacity of each direction of a client's connection, bytes: about that of a socket.
-const CONNECTION_BYTES: usize = 256 * 1024;
+/// Capacity of each direction of a client's connection, bytes.
+const CONNECTION_BYTES: usize = 64 * 1024;
 
 /// Controls of a daemon that runs within the calling program: without sockets, signals and messages
 /// on standard error.
@@ -120,8 +120,8 @@ impl EmbeddedDaemon {
         Ok((Self { handle, router, socket, connections, loader, stop }, work))
     }
 
-    /// Connects a client; returns its end of the connection, which is closed at once if the daemon has
-    /// ended.
+    /// Connects a client; returns its end of the connection, which is closed at once if the daemon
+    /// has ended.
     #[must_use]
     pub fn connect(&self, peer: Peer) -> DuplexStream {
         let (client, server) = duplex(CONNECTION_BYTES);

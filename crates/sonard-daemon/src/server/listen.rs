@@ -75,8 +75,8 @@ impl ListenError {
 }
 
 impl Listeners {
-    /// Returns listeners without sockets: connections are the server's ends of pipes in memory, each
-    /// with the kind of client at the other end.
+    /// Returns listeners without sockets: connections are the server's ends of pipes in memory,
+    /// each with the kind of client at the other end.
     #[must_use]
     pub fn in_memory(connections: UnboundedReceiver<(DuplexStream, Peer)>) -> Self {
         Self { memory: Some(connections), ..Self::default() }
