@@ -14,6 +14,7 @@ use std::{
     time::{Duration, Instant},
 };
 
+use tracing::Subscriber;
 use tracing_subscriber::{
     Layer as _, Registry,
     filter::Targets,
@@ -95,16 +96,31 @@ fn install<W>(writer: W, default_filter: &str, with_time: bool)
 where
     W: for<'a> MakeWriter<'a> + Send + Sync + 'static,
 {
-    let requested = std::env::var("SONARD_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
-    // The defaults are valid.
-    let filter = requested.or_else(|| default_filter.parse().ok()).unwrap_or_default();
+    let requested = std::env::var("SONARD_LOG").ok().filter(|text| text.parse::<Targets>().is_ok());
+    let filter = requested.as_deref().unwrap_or(default_filter);
+    drop(subscriber(writer, filter, with_time, io::stderr().is_terminal()).try_init());
+}
+
+/// Returns a tracing subscriber that writes messages as lines of text.
+///
+/// `filter` lists targets and levels, such as `info,sonard_device=debug`; an invalid list passes no
+/// message.
+pub fn subscriber<W>(
+    writer: W,
+    filter: &str,
+    with_time: bool,
+    with_ansi: bool,
+) -> impl Subscriber + Send + Sync
+where
+    W: for<'a> MakeWriter<'a> + Send + Sync + 'static,
+{
     let lines = layer()
         .with_writer(writer)
-        .with_ansi(io::stderr().is_terminal())
+        .with_ansi(with_ansi)
         .log_internal_errors(false)
         .with_target(false);
     let lines = if with_time { lines.boxed() } else { lines.without_time().boxed() };
-    drop(Registry::default().with(lines).with(filter).try_init());
+    Registry::default().with(lines).with(filter.parse::<Targets>().unwrap_or_default())
 }
 
 /// Writes through [`write_stderr`]; never fails.

@@ -4,6 +4,10 @@ use std::{io, path::PathBuf};
 
 use axum::Router;
 use clap::{Args as _, Command, FromArgMatches as _};
+use tokio::{
+    io::{DuplexStream, duplex},
+    sync::mpsc::{self, UnboundedSender},
+};
 use tokio_util::sync::CancellationToken;
 
 use super::{Args, load::Loader};
@@ -13,14 +17,18 @@ use crate::{
     host_gpio::NoHostGpio,
     link::{Holders, LinkError},
     mock::{MemorySocket, MockPort, Note, Pace},
-    server::{Access, Server},
+    server::{Listeners, Peer, Server},
     supervisor::{Supervisor, Task},
 };
+
+/// Capacity of each direction of a client's connection, bytes.
+const CONNECTION_BYTES: usize = 64 * 1024;
 
 /// Controls of a daemon that runs within the calling program: without sockets, signals and messages
 /// on standard error.
 ///
-/// Requests go through [`router`](Self::router). The device is a mock in memory (`--mock`), the
+/// Requests go through [`router`](Self::router), or through a connection in memory with the limits
+/// and timeouts of a socket. The device is a mock in memory (`--mock`), the
 /// simulated array of
 /// `--simulate`, or whatever is plugged into [`socket`](Self::socket). A single-threaded tokio
 /// runtime with a paused clock can run it, so that tests wait for no real second.
@@ -31,6 +39,7 @@ pub struct EmbeddedDaemon {
     pub router: Router,
     /// Port that the daemon opens, whatever `device.port` is.
     pub socket: MemorySocket,
+    connections: UnboundedSender<(DuplexStream, Peer)>,
     loader: Loader,
     stop: CancellationToken,
 }
@@ -74,6 +83,7 @@ impl EmbeddedDaemon {
             );
         }
         let keys = settings.keys.clone();
+        let access = super::access(&settings, files.token.as_deref(), &Listeners::default())?;
         let log_folder = PathBuf::from(&keys.log.folder);
         let (journal, log) = Journal::open(&log_folder, settings.rotation(), &supervisor)
             .map_err(|error| Failure::device(error, "see log.folder"))?;
@@ -87,18 +97,36 @@ impl EmbeddedDaemon {
                 daemon::prepare(resources, settings)
             }
         };
-        let access = Access::new(&keys.server.hosts, files.token.as_deref());
         let server = Server::new(handle.clone(), log_folder, access, &keys, files.fleet);
+        let router = server.router();
+        let (connections, accepted) = mpsc::unbounded_channel();
         let stop = CancellationToken::new();
         let stopped = stop.clone().cancelled_owned();
         let work = async move {
-            let outcome = daemon.run(stopped).await.map_err(|failure| failure.to_string());
+            let ended = CancellationToken::new();
+            let serving =
+                server.run(Listeners::in_memory(accepted), ended.clone().cancelled_owned());
+            let working = async {
+                let outcome = daemon.run(stopped).await.map_err(|failure| failure.to_string());
+                ended.cancel();
+                outcome
+            };
+            let (outcome, ()) = tokio::join!(working, serving);
             supervisor.stopping().cancel();
             mock_stop.cancel();
             let last = tokio::task::spawn_blocking(|| log.close()).await.unwrap_or_default();
             outcome.and_then(|()| last.error.map_or(Ok(()), Err))
         };
-        Ok((Self { handle, router: server.router(), socket, loader, stop }, work))
+        Ok((Self { handle, router, socket, connections, loader, stop }, work))
+    }
+
+    /// Connects a client; returns its end of the connection, which is closed at once if the daemon
+    /// has ended.
+    #[must_use]
+    pub fn connect(&self, peer: Peer) -> DuplexStream {
+        let (client, server) = duplex(CONNECTION_BYTES);
+        drop(self.connections.send((server, peer)));
+        client
     }
 
     /// Ends the daemon in order: motor stopped, scan closed, log synced.

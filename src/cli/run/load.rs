@@ -170,7 +170,7 @@ fn settings(keys: Keys) -> Result<Settings, Failure> {
         Some(name) => {
             let scene = scene_file::load(name)?;
             let pose = scene_file::pose(&scene, &keys.place.pose)
-                .map_err(|failure| ask_for_pose(&scene, &keys.place.pose, failure))?;
+                .map_err(|failure| explain_missing_pose(&scene, &keys.place.pose, failure))?;
             (Some(Arc::new(scene)), pose)
         }
         None => (None, parse_pose(&keys.place.pose).map_err(refuse_pose)?),
@@ -188,7 +188,7 @@ fn settings(keys: Keys) -> Result<Settings, Failure> {
 }
 
 /// Explains that no pose was given where the default one is not free.
-fn ask_for_pose(scene: &Scene, pose: &str, failure: Failure) -> Failure {
+fn explain_missing_pose(scene: &Scene, pose: &str, failure: Failure) -> Failure {
     if pose != PlaceKeys::default().pose {
         return failure;
     }

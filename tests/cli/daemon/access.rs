@@ -8,25 +8,25 @@ use std::{
     time::{Duration, Instant},
 };
 
-use super::{Daemon, Reply, read_reply, send_request, write_token};
+use sonard::server::Peer;
+use sonard_test_support::in_process::Daemon;
+
+use super::{self as processes, Reply, read_reply, send_request, write_token};
 use crate::common::wait_until;
 
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 
-fn start(folder: &std::path::Path, further: &[&str]) -> Daemon {
+fn options(folder: &std::path::Path, further: &[&str]) -> Vec<String> {
     let token = write_token(folder, format!("{TOKEN}\n"));
     let token = format!("server.token_file={}", token.display());
-    let tcp = [
-        "--set",
-        "server.listen=127.0.0.1:0",
-        "--set",
-        &token,
-        "--set",
-        "scanning.mode=continuous",
-    ];
-    let daemon = Daemon::start_mock(folder, &[&tcp, further].concat());
-    wait_until("the address", || daemon.messages().contains("http://"));
-    daemon
+    let tcp = ["server.listen=127.0.0.1:0", &token, "scanning.mode=continuous"];
+    let settings = tcp.iter().chain(further);
+    settings.flat_map(|setting| ["--set".to_owned(), (*setting).to_owned()]).collect()
+}
+
+fn start(folder: &std::path::Path, further: &[&str]) -> Daemon {
+    let options = options(folder, further);
+    Daemon::start_mock(folder, &options.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
 fn beams(daemon: &Daemon) -> u64 {
@@ -37,7 +37,7 @@ fn beams(daemon: &Daemon) -> u64 {
 fn foreign_origins_are_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = start(folder.path(), &[]);
-    wait_until("some beams", || beams(&daemon) > 2);
+    daemon.wait_until("some beams", || beams(&daemon) > 2);
     let before = beams(&daemon);
     let host = ("Host", "localhost");
     let json = ("Content-Type", "application/json");
@@ -63,7 +63,7 @@ fn foreign_origins_are_rejected() {
         ("GET", "/page/%ff", vec![host], "", 400),
         ("GET", "/v1/status", vec![host, ("Sec-Fetch-Site", "cross-site")], "", 403),
     ] {
-        let reply = send_request(daemon.connect_tcp(), method, path, &headers, body);
+        let reply = send_request(daemon.connect_as(Peer::Loopback), method, path, &headers, body);
         assert_eq!(reply.status, status, "{method} {path} {headers:?}: {}", reply.json());
         if status >= 400 {
             assert_problem(&reply, path);
@@ -73,46 +73,53 @@ fn foreign_origins_are_rejected() {
         assert!(reply.head.contains("cross-origin-resource-policy: same-origin"), "{}", reply.head);
     }
     // Not HTTP at all, and heads without end.
-    let mut stream = daemon.connect_tcp();
+    let mut stream = daemon.connect_as(Peer::Loopback);
     stream.write_all(b"\x16\x03\x01\x02\x00garbage\r\n\r\n").expect("it listens");
     let garbage = read_reply(stream);
     assert_eq!(garbage.status, 400);
     assert_problem(&garbage, "no HTTP");
-    let mut stream = daemon.connect_tcp();
+    let mut stream = daemon.connect_as(Peer::Loopback);
     let many: String = (0..200).map(|n| format!("X-{n}: 1\r\n")).collect();
     let head = format!("GET / HTTP/1.1\r\nHost: localhost\r\n{many}\r\n");
     stream.write_all(head.as_bytes()).expect("it listens");
     let crowded = read_reply(stream);
     assert_eq!(crowded.status, 431);
     assert_problem(&crowded, "a head of many fields");
-    let mut stream = daemon.connect_tcp();
+    let mut stream = daemon.connect_as(Peer::Loopback);
     let flood = format!("GET / HTTP/1.1\r\nHost: localhost\r\nX: {}\r\n", "a".repeat(300_000));
     // It may hang up while being flooded.
     drop(stream.write_all(flood.as_bytes()));
     let mut answer = Vec::new();
     drop(stream.read_to_end(&mut answer));
     assert!(!String::from_utf8_lossy(&answer).contains(" 200 "));
-    wait_until("more beams", || beams(&daemon) > before + 5);
+    daemon.wait_until("more beams", || beams(&daemon) > before + 5);
     assert_eq!(daemon.health()["scans"]["stopped"], 0);
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 }
 
 #[test]
 fn slow_and_excess_clients() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = start(folder.path(), &["--set", "server.max_clients=8"]);
+    let daemon = start(folder.path(), &["server.max_clients=8"]);
     // Seven heads that never end, and one place for everybody else who comes by TCP.
-    let mut slow: Vec<_> = (0..7).map(|_| daemon.connect_tcp()).collect();
+    let mut slow: Vec<_> = (0..7).map(|_| daemon.connect_as(Peer::Loopback)).collect();
     for stream in &mut slow {
         stream.write_all(b"GET /v1/status HTTP/1.1\r\nHost: local").expect("it listens");
     }
-    std::thread::sleep(Duration::from_millis(300));
-    let by_tcp =
-        || send_request(daemon.connect_tcp(), "GET", "/v1/status", &[("Host", "localhost")], "");
+    daemon.pass(Duration::from_millis(300));
+    let by_tcp = || {
+        send_request(
+            daemon.connect_as(Peer::Loopback),
+            "GET",
+            "/v1/status",
+            &[("Host", "localhost")],
+            "",
+        )
+    };
     assert_eq!(by_tcp().status, 200);
-    let mut one_more = daemon.connect_tcp();
+    let mut one_more = daemon.connect_as(Peer::Loopback);
     one_more.write_all(b"GET /v1/status HTTP/1.1\r\nHost: local").expect("it listens");
-    std::thread::sleep(Duration::from_millis(300));
+    daemon.pass(Duration::from_millis(300));
     let full = by_tcp();
     assert_eq!(full.status, 503, "all places are taken");
     assert_problem(&full, "a full house");
@@ -123,7 +130,7 @@ fn slow_and_excess_clients() {
         drop(stream.read_to_end(&mut answer));
     }
     // A body that never ends.
-    let mut stream = daemon.connect().expect("a place is free again");
+    let mut stream = daemon.connect();
     let head = "POST /v1/start HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n\
                 Content-Length: 10\r\n\r\n{";
     stream.write_all(head.as_bytes()).expect("it listens");
@@ -131,13 +138,13 @@ fn slow_and_excess_clients() {
     assert_eq!(late.status, 408);
     assert_problem(&late, "a body that never ends");
     assert!(beams(&daemon) > 5, "it went on scanning");
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 }
 
 #[test]
 fn request_rate_limit() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = start(folder.path(), &["--set", "server.max_requests_per_s=20"]);
+    let daemon = start(folder.path(), &["server.max_requests_per_s=20"]);
     let statuses: Vec<u16> = (0..100).map(|_| daemon.get("/v1/plan").status).collect();
     let passed = statuses.iter().filter(|&&status| status == 200).count();
     let refused = statuses.iter().filter(|&&status| status == 429).count();
@@ -145,8 +152,8 @@ fn request_rate_limit() {
         passed >= 20 && refused >= 20 && passed + refused == 100,
         "{passed} passed, {refused} refused"
     );
-    std::thread::sleep(Duration::from_secs(1));
-    wait_until("beams", || beams(&daemon) > 0);
+    daemon.pass(Duration::from_secs(1));
+    daemon.wait_until("beams", || beams(&daemon) > 0);
 }
 
 /// Checks the format of a rejection.
@@ -160,7 +167,10 @@ fn assert_problem(reply: &Reply, of: &str) {
 #[test]
 fn loopback_without_token() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = start(folder.path(), &["--set", "server.max_requests_per_s=50"]);
+    let options = options(folder.path(), &["server.max_requests_per_s=50"]);
+    let options: Vec<&str> = options.iter().map(String::as_str).collect();
+    let daemon = processes::Daemon::start_mock(folder.path(), &options);
+    wait_until("the address", || daemon.messages().contains("http://"));
     let subscribe = |host: &str| {
         let mut stream = daemon.connect_tcp();
         let request = format!("GET /v1/live/records HTTP/1.1\r\nHost: {host}\r\n\r\n");

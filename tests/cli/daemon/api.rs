@@ -19,6 +19,7 @@ use sonard::{
     },
     geometry::Pose,
     scan::{ScanPlan, Session},
+    server::Peer,
 };
 use sonard_test_support::in_process::Daemon as InProcess;
 
@@ -288,11 +289,11 @@ fn past_scans_and_beams() {
 #[test]
 fn log_byte_ranges() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = Daemon::start_mock(folder.path(), &SHORT);
+    let daemon = InProcess::start_mock(folder.path(), &SHORT);
     daemon.wait_for("ready");
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
     daemon.wait_for_scans(1);
-    wait_until("the log", || {
+    daemon.wait_until("the log", || {
         let log = daemon.status()["log"].clone();
         log["synced"].as_u64() >= log["written"].as_u64()
     });
@@ -300,8 +301,8 @@ fn log_byte_ranges() {
     let path = format!("/v1/logs/{}", log.file_name().expect("a name").to_string_lossy());
     let whole = fs::read(&log).expect("readable");
     let get = |range: &str| {
-        let headers = [("Host", "localhost"), ("Range", range)];
-        super::send_request(daemon.connect().expect("it listens"), "GET", &path, &headers, "")
+        let headers = [("Range", range)];
+        daemon.request(Peer::Unix, "GET", &path, &headers, "")
     };
     let reply = get("bytes=100-");
     assert_eq!((reply.status, &reply.body[..]), (206, &whole[100..]));

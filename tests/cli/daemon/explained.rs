@@ -1,10 +1,9 @@
 //! Changes of pose, air or sensor that explain a scan better than the assumed ones.
 
 use serde_json::{Value, json};
-use sonard::mock::Pace;
+use sonard_test_support::{in_process::Daemon, rig};
 
-use super::{Daemon, clean_log, logs, rig::Rig};
-use crate::common::{run, wait_until};
+use super::{clean_log, logs};
 
 /// Takes a scan at the pose in the configuration.
 fn scan(daemon: &Daemon, pose: [f64; 3], number: u64) {
@@ -19,7 +18,7 @@ fn scan(daemon: &Daemon, pose: [f64; 3], number: u64) {
 fn explanations(daemon: &Daemon) -> Vec<Value> {
     let reported =
         || daemon.health()["fit"]["explanations"].as_array().cloned().unwrap_or_default();
-    wait_until("an explanation", || !reported().is_empty());
+    daemon.wait_until("an explanation", || !reported().is_empty());
     reported()
 }
 
@@ -33,11 +32,8 @@ fn events(folder: &std::path::Path) -> Vec<String> {
 #[test]
 fn wrong_pose_is_reported_once() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut rig = Rig::new(folder.path(), Pace::Virtual);
-    rig.plug("", 1);
-    let options = rig.options();
-    let options: Vec<&str> = options.iter().map(String::as_str).collect();
-    let daemon = Daemon::start(folder.path(), &options);
+    let mut daemon = Daemon::start(folder.path(), &rig::OPTIONS);
+    daemon.plug("", 1);
     daemon.wait_for("ready");
     let truth = daemon.get("/v1/pose").json();
     let [x_m, y_m, heading_deg] =
@@ -53,20 +49,19 @@ fn wrong_pose_is_reported_once() {
         let value = of["value"].as_f64().expect("a number");
         assert!((value + 0.02).abs() < 0.004, "{name}: {found:?}");
     }
-    let socket = folder.path().join("s").display().to_string();
-    let printed = String::from_utf8(run(&["status", "--socket", &socket]).stdout).expect("text");
+    let printed = String::from_utf8(daemon.run_client("status").stdout).expect("text");
     assert!(printed.contains("fit      better with "), "{printed}");
     assert_eq!(daemon.get("/v1/pose").json()["x_m"].as_f64(), Some(x_m + 0.02));
     scan(&daemon, [x_m, y_m, heading_deg], 2);
     let log = logs(folder.path()).remove(0);
-    let is_told = || std::fs::read_to_string(&log).is_ok_and(|log| log.contains("no longer"));
-    wait_until("news", is_told);
+    let is_withdrawn = || std::fs::read_to_string(&log).is_ok_and(|log| log.contains("no longer"));
+    daemon.wait_until("the event", is_withdrawn);
     assert_eq!(daemon.health()["fit"]["explanations"], json!([]));
     for number in [3, 4] {
         scan(&daemon, beside, number);
         explanations(&daemon);
     }
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
     let events = events(folder.path());
     assert_eq!(events.len(), 3, "{events:?}");
     assert!(events[0].contains("better explained: ") && events[2].contains("better explained: "));
@@ -76,11 +71,8 @@ fn wrong_pose_is_reported_once() {
 #[test]
 fn few_beams_are_not_explained() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut rig = Rig::new(folder.path(), Pace::Virtual);
-    rig.plug("", 1);
-    let options = rig.options();
-    let options: Vec<&str> = options.iter().map(String::as_str).collect();
-    let daemon = Daemon::start(folder.path(), &options);
+    let mut daemon = Daemon::start(folder.path(), &rig::OPTIONS);
+    daemon.plug("", 1);
     daemon.wait_for("ready");
     let [x_m, y_m, heading_deg] = ["x_m", "y_m", "heading_deg"]
         .map(|key| daemon.get("/v1/pose").json()[key].as_f64().expect("a number"));
@@ -93,7 +85,7 @@ fn few_beams_are_not_explained() {
     explanations(&daemon);
     let latest = daemon.get("/v1/scan/latest").json();
     let id = latest["start"]["scan"].as_str().expect("an id").to_owned();
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
     // Of the scans with 20 and with 400 beams, only the second one is explained.
     let events = events(folder.path());
     assert!(events.len() == 1 && events[0].contains(&id), "{id}: {events:?}");

@@ -22,17 +22,17 @@ fn start(rig: &Rig, folder: &std::path::Path, further: &[&str]) -> Daemon {
 #[test]
 fn unplugged_ranger() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut rig = Rig::new(folder.path(), Pace::RealTime);
-    let daemon = start(&rig, folder.path(), &[]);
+    let continuous = ["--set", "scanning.mode=continuous"];
+    let mut daemon = InProcess::start(folder.path(), &[&rig::OPTIONS[..], &continuous].concat());
     daemon.wait_for("absent");
-    rig.plug("", 1);
-    wait_until("beams", || daemon.status()["scan"]["done"].as_u64() >= Some(3));
-    rig.unplug();
+    daemon.plug("", 1);
+    daemon.wait_until("beams", || daemon.status()["scan"]["done"].as_u64() >= Some(3));
+    daemon.unplug();
     daemon.wait_for("absent");
     wait_until("the message", || daemon.messages().matches("absent: ").count() == 2);
     // The absence is reported once.
     let printed = daemon.messages().lines().count();
-    std::thread::sleep(Duration::from_secs(3));
+    daemon.pass(Duration::from_secs(3));
     assert_eq!(daemon.messages().lines().count(), printed, "{}", daemon.messages());
     let status = daemon.status();
     assert!(status["link"]["retry_in_s"].as_f64().is_some_and(|wait_s| wait_s <= 0.4));
@@ -41,11 +41,11 @@ fn unplugged_ranger() {
         "{status}"
     );
     assert_eq!(daemon.get("/v1/health").status, 503);
-    rig.plug("", 2);
-    wait_until("beams again", || daemon.status()["scan"]["done"].as_u64() >= Some(3));
+    daemon.plug("", 2);
+    daemon.wait_until("beams again", || daemon.status()["scan"]["done"].as_u64() >= Some(3));
     let health = daemon.health();
     assert_eq!((&health["line"]["losses"], &health["healthy"]), (&json!(1), &json!(true)));
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
     let log = clean_log(folder.path());
     let events = log.events();
     let count = |what: &str| events.iter().filter(|event| event.contains(what)).count();

@@ -14,7 +14,10 @@ use std::{
 };
 
 use serde_json::Value;
-use sonard_test_support::fleet::{Fleet, SCANNING, until_it_listens};
+use sonard_test_support::{
+    fleet::{Fleet, SCANNING, until_it_listens},
+    in_process::Daemon as InProcess,
+};
 
 use super::{Daemon, send_request, write_token};
 use crate::common::{run, sonard, stderr, wait_until};
@@ -78,7 +81,7 @@ fn status_of_three_robots() {
 #[test]
 fn without_a_fleet() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = Daemon::start_mock(folder.path(), &[]);
+    let daemon = InProcess::start_mock(folder.path(), &[]);
     assert_eq!(daemon.get("/v1/fleet").status, 404);
     assert_eq!(daemon.get("/fleet").status, 404);
     let page = String::from_utf8(daemon.get("/").body).expect("text");

@@ -9,20 +9,30 @@ mod viewer;
 use std::time::Duration;
 
 use serde_json::{Value, json};
+use sonard_test_support::in_process::{Daemon, start_array};
 
-use super::{Daemon, clean_log};
+use super::clean_log;
 use viewer::{Received, Viewer, range_of};
+
+const SETTINGS: [&str; 8] = [
+    "--set",
+    "foxglove.enabled=true",
+    "--set",
+    "model.max_range_m=3",
+    "--set",
+    "plan.to_deg=36",
+    "--set",
+    "motion.min_interval_ms=10",
+];
 
 /// A daemon with viewers, of a small plan.
 fn start(folder: &std::path::Path, further: &[&str]) -> Daemon {
-    let settings = [
-        "foxglove.enabled=true",
-        "model.max_range_m=3",
-        "plan.to_deg=36",
-        "motion.min_interval_ms=10",
-    ];
-    let settings: Vec<&str> = settings.iter().flat_map(|setting| ["--set", setting]).collect();
-    Daemon::start_mock(folder, &[&settings, further].concat())
+    Daemon::start_mock(folder, &[&SETTINGS, further].concat())
+}
+
+/// As [`start`], in a process of its own.
+fn start_process(folder: &std::path::Path, further: &[&str]) -> super::Daemon {
+    super::Daemon::start_mock(folder, &[&SETTINGS, further].concat())
 }
 
 #[test]
@@ -31,7 +41,7 @@ fn readings_match_the_log() {
     let daemon = start(folder.path(), &[]);
     daemon.wait_for("ready");
     let mut viewers = ["foxglove.sdk.v1", "foxglove.websocket.v1"].map(|protocol| {
-        let mut viewer = Viewer::new(daemon.connect().expect("it listens"), protocol);
+        let mut viewer = Viewer::new(daemon.connect(), protocol);
         assert_eq!(viewer.protocol, protocol);
         let info = viewer.text();
         assert_eq!((&info["op"], &info["capabilities"]), (&json!("serverInfo"), &json!([])));
@@ -47,7 +57,7 @@ fn readings_match_the_log() {
     for viewer in &mut viewers {
         viewer.wait_for_channels();
         viewer.subscribe_to_all();
-        let kept = viewer.for_a_while(Duration::from_millis(500));
+        let kept = viewer.receive_for(Duration::from_millis(500));
         assert_eq!((kept.of("/tf_static").count(), kept.of("/sonar/scene").count()), (1, 1));
     }
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
@@ -74,8 +84,8 @@ fn readings_match_the_log() {
     let [mut one, other] = viewers;
     drop(other);
     one.close();
-    crate::common::wait_until("they left", || daemon.status()["subscribers"]["now"] == 0);
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.wait_until("they left", || daemon.status()["subscribers"]["now"] == 0);
+    daemon.stop();
 }
 
 /// Checks that a topic has the stamps and ranges of the readings with a range.
@@ -106,19 +116,19 @@ fn assert_ranges<'a>(
 #[test]
 fn late_viewer_gets_the_last_scan() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = start(folder.path(), &["--virtual-time"]);
+    let daemon = start(folder.path(), &[]);
     daemon.wait_for("ready");
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":2}"#).status, 202);
     daemon.wait_for_scans(2);
-    // Messages are made beside all else: until there are no more.
-    let mut early = Viewer::new(daemon.connect().expect("it listens"), "foxglove.sdk.v1");
+    // Messages are converted in a task of their own: until none is left.
+    let mut early = Viewer::new(daemon.connect(), "foxglove.sdk.v1");
     early.wait_for_channels();
     early.subscribe_to_all();
-    while early.for_a_while(Duration::from_secs(1)).topics().any(|topic| topic == "/sonar/range") {}
-    let mut late = Viewer::new(daemon.connect().expect("it listens"), "foxglove.sdk.v1");
+    while early.receive_for(Duration::from_secs(1)).topics().any(|topic| topic == "/sonar/range") {}
+    let mut late = Viewer::new(daemon.connect(), "foxglove.sdk.v1");
     late.wait_for_channels();
     late.subscribe_to_all();
-    let reported = late.for_a_while(Duration::from_secs(1));
+    let reported = late.receive_for(Duration::from_secs(1));
     for topic in
         ["/tf", "/tf_static", "/sonar/scene", "/sonar/scan", "/sonar/points", "/sonar/paths"]
     {
@@ -129,17 +139,15 @@ fn late_viewer_gets_the_last_scan() {
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
     let reported = late.until("/sonar/paths");
     assert!(reported.of("/sonar/range").count() > 30);
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
     assert!(matches!(late.next(), None | Some(viewer::Came::End(1001))), "a close frame");
 }
 
 #[test]
 fn topic_per_ranger() {
     let folder = tempfile::tempdir().expect("a folder");
-    let array = ["--simulate", "--array", "pioneer-8", "--scene", "mcgill-lab", "--pose", "fig4"];
-    let daemon =
-        Daemon::start(folder.path(), &[&array[..], &["--set", "foxglove.enabled=true"]].concat());
-    let mut viewer = Viewer::new(daemon.connect().expect("it listens"), "foxglove.sdk.v1");
+    let daemon = start_array(folder.path(), &["--set", "foxglove.enabled=true"]);
+    let mut viewer = Viewer::new(daemon.connect(), "foxglove.sdk.v1");
     viewer.wait_for_channels();
     viewer.subscribe_to_all();
     drop(viewer.until("/sonar/points"));
@@ -148,5 +156,5 @@ fn topic_per_ranger() {
     let of_rangers = topics.iter().filter(|topic| topic.ends_with("/range")).count();
     assert_eq!(of_rangers, 8, "{topics:?}");
     assert!(!topics.contains(&"/sonar/scan") && !topics.contains(&"/sonar/range"), "{topics:?}");
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 }

@@ -5,8 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{Daemon, logs};
-use crate::common::{Log, run, wait_until};
+use sonard_test_support::in_process::Daemon;
+
+use super::logs;
+use crate::common::{Log, run};
 
 /// A scanning daemon, and the log that it writes.
 fn start(folder: &Path) -> (Daemon, PathBuf) {
@@ -14,14 +16,14 @@ fn start(folder: &Path) -> (Daemon, PathBuf) {
     let further: Vec<&str> = settings.iter().flat_map(|setting| ["--set", setting]).collect();
     let daemon = Daemon::start_mock(folder, &further);
     daemon.wait_for_scans(1);
-    wait_until("beams", || daemon.status()["scan"]["done"].as_u64() >= Some(5));
+    daemon.wait_until("beams", || daemon.status()["scan"]["done"].as_u64() >= Some(5));
     let log = logs(folder).pop().expect("a log");
     (daemon, log)
 }
 
 /// Waits until the daemon reports the incident and scans again; returns its logs' records after the end.
 fn recover(daemon: Daemon, incident: &str) -> Log {
-    wait_until("the incident", || {
+    daemon.wait_until("the incident", || {
         let text = daemon.status()["log"]["incident"].to_string();
         text.contains(incident)
     });
@@ -33,7 +35,7 @@ fn recover(daemon: Daemon, incident: &str) -> Log {
         ["written", "synced", "uncertain"].map(|key| status["log"][key].as_u64().expect("a count"));
     assert!(synced + uncertain <= written, "{status}");
     let folder = daemon.folder.clone();
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
     let mut text = String::new();
     for log in logs(&folder) {
         let verified = run(&["log", "verify", log.to_str().expect("plain path")]);
@@ -76,8 +78,13 @@ fn moved_log_is_completed() {
     fs::rename(&log, &moved).expect("it is there");
     let log = recover(daemon, "moved or replaced");
     assert_gap(&log, "moved or replaced");
-    let verified = run(&["log", "verify", "--strict", moved.to_str().expect("plain path")]);
-    assert_eq!(verified.status.code(), Some(0), "{}", String::from_utf8_lossy(&verified.stdout));
+    let verified = run(&["log", "verify", moved.to_str().expect("plain path")]);
+    let printed = String::from_utf8_lossy(&verified.stdout).into_owned();
+    assert_eq!(verified.status.code(), Some(0), "{printed}");
+    // The device's clock is simulated, that of events is not.
+    let is_other =
+        |line: &&str| line.contains("warning: ") && !line.contains("time goes backwards");
+    assert_eq!(printed.lines().find(is_other), None);
     let moved = Log::read(&moved);
     assert_eq!(moved.of_type("scan_start").count(), moved.of_type("scan_end").count());
 }

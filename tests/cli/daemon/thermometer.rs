@@ -1,11 +1,9 @@
 //! Values that a thermometer or the air cannot have.
 
-use std::{fs, path::Path, time::Duration};
+use std::{fs, path::Path};
 
 use serde_json::Value;
-
-use super::Daemon;
-use crate::common::{run, wait_until};
+use sonard_test_support::in_process::Daemon;
 
 /// A scratchpad of zeros, the checksum of which is right.
 const ZEROS: &str = "00 00 00 00 00 00 00 00 00 : crc=00 YES\n00 00 00 00 00 00 00 00 00 t=0\n";
@@ -26,25 +24,23 @@ fn air(daemon: &Daemon) -> Value {
     daemon.status()["air"].clone()
 }
 
-fn status_text(folder: &Path) -> String {
-    let socket = folder.join("s");
-    let output = run(&["status", "--socket", socket.to_str().expect("plain path")]);
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
 #[test]
 fn zeros() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("w1_slave");
     fs::write(&file, ZEROS).expect("a file");
     let daemon = start(folder.path(), &file);
-    wait_until("the report", || reasons(&daemon).contains("all registers of the sensor are 00"));
+    daemon.wait_until("the report", || {
+        reasons(&daemon).contains("all registers of the sensor are 00")
+    });
     let now = air(&daemon);
     assert_eq!((&now["temperature_c"], &now["source"]), (&20.0.into(), &"configuration".into()));
-    wait_until("the message", || daemon.messages().contains("all registers of the sensor are 00"));
+    daemon.wait_until("the message", || {
+        daemon.messages().contains("all registers of the sensor are 00")
+    });
 
     fs::write(&file, ZERO_C).expect("a file");
-    wait_until("0 C", || air(&daemon)["temperature_c"] == 0.0);
+    daemon.wait_until("0 C", || air(&daemon)["temperature_c"] == 0.0);
     let now = air(&daemon);
     assert_eq!((&now["source"], &now["error"]), (&"file".into(), &Value::Null));
     assert!(!reasons(&daemon).contains("thermometer"), "{}", reasons(&daemon));
@@ -62,7 +58,7 @@ fn last_valid_temperature() {
     let file = folder.path().join("temp1_input");
     fs::write(&file, "21500\n").expect("a file");
     let daemon = start(folder.path(), &file);
-    wait_until("21.5 C", || air(&daemon)["temperature_c"] == 21.5);
+    daemon.wait_until("21.5 C", || air(&daemon)["temperature_c"] == 21.5);
     let mut replaced_by_pipe = false;
     for (bad, part) in [
         (Some("1500\n"), "air does not change so fast"),
@@ -81,7 +77,7 @@ fn last_valid_temperature() {
                 replaced_by_pipe = made.expect("mkfifo").success();
             }
         }
-        wait_until(part, || reasons(&daemon).contains(part));
+        daemon.wait_until(part, || reasons(&daemon).contains(part));
         let reasons = reasons(&daemon);
         assert!(reasons.contains("the last valid temperature, 21.5 C, is"), "{reasons}");
         assert_eq!(air(&daemon)["temperature_c"], 21.5);
@@ -93,13 +89,13 @@ fn last_valid_temperature() {
     assert!(figures.contains("sonard_thermometer_failing 1"), "{figures}");
     assert!(figures.contains("sonard_air_temperature_celsius 21.5"), "{figures}");
     assert!(figures.contains("sonard_air_age_seconds "), "{figures}");
-    let text = status_text(folder.path());
+    let text = String::from_utf8(daemon.run_client("status").stdout).expect("text");
     assert!(text.contains("21.5 C (file, ") && text.contains("a named pipe"), "{text}");
 
     // It is no longer blocked, whatever the pipe did.
     fs::remove_file(&file).expect("removed");
     fs::write(&file, "22000\n").expect("a file");
-    wait_until("22 C", || air(&daemon)["temperature_c"] == 22.0);
+    daemon.wait_until("22 C", || air(&daemon)["temperature_c"] == 22.0);
     assert_eq!(reasons(&daemon), "[]");
 }
 
@@ -112,7 +108,7 @@ fn slow_changes() {
     for thousandths in (21_000..24_000).step_by(500) {
         fs::write(&file, format!("{thousandths}\n")).expect("a file");
         let expected = f64::from(thousandths) / 1e3;
-        wait_until("the change", || air(&daemon)["temperature_c"] == expected);
+        daemon.wait_until("the change", || air(&daemon)["temperature_c"] == expected);
     }
     assert!(!daemon.messages().contains("WARN"), "{}", daemon.messages());
 }
@@ -123,8 +119,6 @@ fn blocking_file() {
     let file = folder.path().join("pipe");
     assert!(std::process::Command::new("mkfifo").arg(&file).status().expect("mkfifo").success());
     let daemon = start(folder.path(), &file);
-    wait_until("the report", || reasons(&daemon).contains("a named pipe"));
-    let began = std::time::Instant::now();
-    assert_eq!(daemon.stop(), Some(0));
-    assert!(began.elapsed() < Duration::from_secs(5));
+    daemon.wait_until("the report", || reasons(&daemon).contains("a named pipe"));
+    daemon.stop();
 }

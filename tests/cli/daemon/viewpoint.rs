@@ -5,8 +5,7 @@ use std::io::{BufRead as _, BufReader, Write as _};
 use serde_json::Value;
 use sonard_test_support::in_process;
 
-use super::{Reply, start_ahead};
-use crate::common::wait_until;
+use super::Reply;
 
 /// The newest scan that has ended, by a function that sends GET requests.
 fn newest(get: impl Fn(&str) -> Reply) -> Value {
@@ -96,12 +95,12 @@ fn offset_transducer() {
     for (further, late_m) in [(&[][..], time_walk_m as fn(f64) -> f64), (&CONE, |_| 1e-3)] {
         let folder = tempfile::tempdir().expect("a folder");
         let plan = ["--set", "plan.step_deg=18", "--set", "model.max_range_m=4"];
-        let daemon = start_ahead(folder.path(), &[&plan, further].concat());
+        let daemon = in_process::start_ahead(folder.path(), &[&plan, further].concat());
         daemon.wait_for("ready");
-        let mut live = daemon.connect().expect("it listens");
+        let mut live = daemon.connect();
         let request = "GET /v1/live/records?verdicts=true HTTP/1.1\r\nHost: localhost\r\n\r\n";
         live.write_all(request.as_bytes()).expect("it listens");
-        wait_until("the stream", || daemon.status()["subscribers"]["now"] == 1);
+        daemon.wait_until("the stream", || daemon.status()["subscribers"]["now"] == 1);
         assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
         let reported: Vec<Value> = BufReader::new(live)
             .lines()

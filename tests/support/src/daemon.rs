@@ -190,17 +190,23 @@ impl Drop for Daemon {
     }
 }
 
-/// A mock without noise whose transducer is 0.1 m ahead of the rotation axis, in a room where it can turn.
+/// Starts a mock without noise whose transducer is 0.1 m ahead of the rotation axis, in a room where it can turn.
 pub fn start_ahead(folder: &Path, further: &[&str]) -> Daemon {
+    let ahead = ahead_options(folder);
+    let ahead: Vec<&str> = ahead.iter().map(String::as_str).collect();
+    Daemon::start(folder, &[&ahead[..], further].concat())
+}
+
+/// Options of a mock without noise whose transducer is 0.1 m ahead of the rotation axis.
+pub(crate) fn ahead_options(folder: &Path) -> Vec<String> {
     let shown = run(&["sensor", "show", "senscomp-6500"]);
     let mut sensor: Value = serde_json::from_slice(&shown.stdout).expect("a sensor");
     sensor["mounting"]["ahead_m"] = 0.1.into();
     let file = folder.join("ahead.json");
     fs::write(&file, sensor.to_string()).expect("there is room");
     let sensor = format!("model.sensor={}", file.display());
-    let mock = ["--mock", "--scene", "two-surface-room", "--pose", "middle", "--set", &sensor];
-    let quiet = ["--noise-mm", "0"];
-    Daemon::start(folder, &[&mock, &quiet[..], further].concat())
+    let mock = ["--mock", "--scene", "two-surface-room", "--pose", "middle", "--noise-mm", "0"];
+    [&mock[..], &["--set", &sensor]].concat().into_iter().map(str::to_owned).collect()
 }
 
 /// Starts a stationary simulated array of eight rangers in the laboratory.

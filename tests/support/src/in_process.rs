@@ -1,11 +1,16 @@
-//! A daemon within the test's process: mock board in memory, paused clock, requests through the router.
+//! A daemon within the test's process: mock board and clients in memory, paused clock, messages in a buffer.
 //!
 //! Time advances only while a test waits for the daemon, and then as fast as the daemon works: a test with seconds of
 //! device time takes milliseconds.
 
 use std::{
-    io,
+    fs,
+    io::{self, BufRead as _, BufReader, Read, Write},
+    os::unix::net::{UnixListener, UnixStream},
     path::{Path, PathBuf},
+    process::{Output, Stdio},
+    rc::Rc,
+    sync::{Arc, Mutex},
     time::Duration,
 };
 
@@ -17,15 +22,23 @@ use http_body_util::BodyExt as _;
 use serde_json::Value;
 use sonard::{
     cli::EmbeddedDaemon,
+    messages,
     mock::{MockPort, Pace},
     server::Peer,
 };
-use tokio::{runtime::Runtime, sync::oneshot, task::JoinHandle, time::sleep};
+use tokio::{
+    io::{AsyncReadExt as _, AsyncWriteExt as _, DuplexStream},
+    runtime::Runtime,
+    sync::oneshot,
+    task::JoinHandle,
+    time::{Instant, sleep, timeout},
+};
 use tower::ServiceExt as _;
+use tracing::{Dispatch, dispatcher};
 
 use crate::{
-    daemon::{ARRAY, MOCK, Reply},
-    rig,
+    daemon::{ARRAY, MOCK, Reply, ahead_options},
+    rig, sonard,
 };
 
 /// Simulated time that passes before each request.
@@ -39,7 +52,8 @@ const LIMIT: Duration = Duration::from_secs(120);
 pub struct Daemon {
     pub folder: PathBuf,
     pub control: EmbeddedDaemon,
-    runtime: Runtime,
+    executor: Rc<Executor>,
+    messages: MessageBuffer,
     running: JoinHandle<Result<(), String>>,
     boots: u16,
     board: Option<(oneshot::Sender<()>, JoinHandle<io::Result<()>>)>,
@@ -51,18 +65,24 @@ impl Daemon {
     /// # Panics
     /// If the options are wrong.
     pub fn start(folder: &Path, options: &[&str]) -> Self {
-        let runtime =
-            tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build();
-        let runtime = runtime.expect("a runtime");
+        Self::start_at_level("info", folder, options)
+    }
+
+    /// Starts a daemon that logs messages of a level such as `trace`.
+    ///
+    /// # Panics
+    /// If the options are wrong.
+    pub fn start_at_level(level: &str, folder: &Path, options: &[&str]) -> Self {
+        let messages = MessageBuffer::default();
+        let executor = Rc::new(Executor::new(level, messages.clone()));
         let log = folder.join("log");
         let log = ["--log", log.to_str().expect("plain path")];
-        let context = runtime.enter();
-        let prepared = EmbeddedDaemon::from_options(&[&log, options].concat());
+        let prepared =
+            executor.block_on(async { EmbeddedDaemon::from_options(&[&log, options].concat()) });
         let (control, work) =
             prepared.unwrap_or_else(|failure| panic!("the daemon starts: {failure:?}"));
-        let running = runtime.spawn(work);
-        drop(context);
-        Self { folder: folder.into(), control, runtime, running, boots: 0, board: None }
+        let running = executor.runtime.spawn(work);
+        Self { folder: folder.into(), control, executor, messages, running, boots: 0, board: None }
     }
 
     /// Starts a daemon with a mock in the simple room.
@@ -80,13 +100,14 @@ impl Daemon {
         self.unplug();
         self.boots += 1;
         let faults = faults.parse().expect("faults");
-        let _context = self.runtime.enter();
+        let _context = self.executor.runtime.enter();
         let port = MockPort::in_memory(
             rig::board(rig::simple_room(), self.boots, faults, seed, Pace::RealTime),
             self.control.socket.clone(),
         );
         let (stop, stopped) = oneshot::channel::<()>();
-        let running = self.runtime.spawn(port.run(async move { drop(stopped.await) }, drop));
+        let running =
+            self.executor.runtime.spawn(port.run(async move { drop(stopped.await) }, drop));
         self.board = Some((stop, running));
     }
 
@@ -94,13 +115,35 @@ impl Daemon {
     pub fn unplug(&mut self) {
         if let Some((stop, running)) = self.board.take() {
             let _ = stop.send(());
-            drop(self.runtime.block_on(running));
+            drop(self.executor.block_on(running));
         }
     }
 
     /// Lets simulated time pass.
     pub fn pass(&self, time: Duration) {
-        self.runtime.block_on(async { sleep(time).await });
+        self.executor.block_on(async { sleep(time).await });
+    }
+
+    /// Messages that the daemon has logged, without times.
+    ///
+    /// # Panics
+    /// If a message is no text.
+    pub fn messages(&self) -> String {
+        let bytes = self.messages.0.lock().expect("no panic").clone();
+        String::from_utf8(bytes).expect("messages are text")
+    }
+
+    /// Connects a client of the unix socket.
+    pub fn connect(&self) -> Connection {
+        self.connect_as(Peer::Unix)
+    }
+
+    pub fn connect_as(&self, peer: Peer) -> Connection {
+        Connection {
+            stream: self.control.connect(peer),
+            executor: Rc::clone(&self.executor),
+            read_timeout: LIMIT,
+        }
     }
 
     pub fn get(&self, path: &str) -> Reply {
@@ -133,7 +176,7 @@ impl Daemon {
         }
         let request = request.body(Body::from(body.to_owned())).expect("a request");
         let router = self.control.router.clone();
-        self.runtime.block_on(async {
+        self.executor.block_on(async {
             sleep(STEP).await;
             let response = router.oneshot(request).await.unwrap_or_else(|never| match never {});
             let (parts, body) = response.into_parts();
@@ -144,6 +187,42 @@ impl Daemon {
             let body = body.collect().await.expect("a whole body").to_bytes().to_vec();
             Reply { status: parts.status.as_u16(), head: head.to_ascii_lowercase(), body }
         })
+    }
+
+    /// Runs a command of the program that sends GET requests to a daemon, such as `status`.
+    ///
+    /// # Panics
+    /// If the program does not start.
+    pub fn run_client(&self, command: &str) -> Output {
+        let socket = self.folder.join("s");
+        let listener = UnixListener::bind(&socket).expect("the name is free");
+        listener.set_nonblocking(true).expect("a socket");
+        let mut client = sonard(&[command, "--socket", socket.to_str().expect("plain path")]);
+        let client = client.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+        let mut client = client.expect("the program starts");
+        while client.try_wait().expect("its state").is_none() {
+            match listener.accept() {
+                Ok((stream, _)) => self.respond(stream),
+                Err(_) => std::thread::sleep(REAL_STEP),
+            }
+        }
+        fs::remove_file(socket).expect("it is there");
+        client.wait_with_output().expect("it has ended")
+    }
+
+    /// Passes a client's GET request on, and the response back.
+    fn respond(&self, mut stream: UnixStream) {
+        stream.set_nonblocking(false).expect("a socket");
+        let mut head = BufReader::new(&stream).lines().map_while(Result::ok);
+        let request = head.next().expect("a request");
+        head.take_while(|line| !line.is_empty()).for_each(drop);
+        let reply = self.get(request.split(' ').nth(1).expect("a path"));
+        let (status, length) = (reply.status, reply.body.len());
+        let head = format!(
+            "HTTP/1.1 {status} \r\nContent-Type: application/json\r\nConnection: close\r\n\
+             Content-Length: {length}\r\n\r\n"
+        );
+        drop(stream.write_all(&[head.as_bytes(), &reply.body].concat()));
     }
 
     pub fn status(&self) -> Value {
@@ -161,14 +240,14 @@ impl Daemon {
     pub fn wait_until(&self, what: &str, condition: impl Fn() -> bool) {
         let start = self.now();
         while !condition() {
-            self.runtime.block_on(async { sleep(STEP).await });
+            self.executor.block_on(async { sleep(STEP).await });
             std::thread::sleep(REAL_STEP);
             assert!(self.now() - start < LIMIT, "waited in vain for {what}: {}", self.status());
         }
     }
 
-    fn now(&self) -> tokio::time::Instant {
-        self.runtime.block_on(async { tokio::time::Instant::now() })
+    fn now(&self) -> Instant {
+        self.executor.now()
     }
 
     /// Waits for a state of the link.
@@ -183,7 +262,7 @@ impl Daemon {
 
     /// Reads the configuration again, as SIGHUP does.
     pub fn reload(&mut self) {
-        self.runtime.block_on(self.control.reload()).expect("the daemon runs");
+        self.executor.block_on(self.control.reload()).expect("the daemon runs");
     }
 
     /// Ends the daemon in order.
@@ -192,12 +271,95 @@ impl Daemon {
     /// If a task failed or the log was not closed.
     pub fn stop(self) {
         self.control.stop();
-        let outcome = self.runtime.block_on(self.running).expect("no panic");
+        let outcome = self.executor.block_on(self.running).expect("no panic");
         assert_eq!(outcome, Ok(()));
+    }
+}
+
+/// Messages as lines of text. Clones share the buffer.
+#[derive(Clone, Default)]
+struct MessageBuffer(Arc<Mutex<Vec<u8>>>);
+
+impl Write for MessageBuffer {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.0.lock().expect("no panic").extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Runtime with a paused clock, whose tasks log messages into a buffer.
+struct Executor {
+    runtime: Runtime,
+    messages: Dispatch,
+}
+
+impl Executor {
+    fn new(level: &str, buffer: MessageBuffer) -> Self {
+        let runtime =
+            tokio::runtime::Builder::new_current_thread().enable_all().start_paused(true).build();
+        let messages =
+            Dispatch::new(messages::subscriber(move || buffer.clone(), level, false, false));
+        Self { runtime: runtime.expect("a runtime"), messages }
+    }
+
+    fn block_on<F: Future>(&self, future: F) -> F::Output {
+        dispatcher::with_default(&self.messages, || self.runtime.block_on(future))
+    }
+
+    fn now(&self) -> Instant {
+        self.block_on(async { Instant::now() })
+    }
+}
+
+/// Client's end of a connection to a daemon. Simulated time passes while it reads or writes.
+pub struct Connection {
+    stream: DuplexStream,
+    executor: Rc<Executor>,
+    read_timeout: Duration,
+}
+
+impl Connection {
+    /// Sets the simulated time after which a read without data fails.
+    pub fn set_read_timeout(&mut self, limit: Duration) {
+        self.read_timeout = limit;
+    }
+
+    /// Simulated time.
+    pub fn now(&self) -> Instant {
+        self.executor.now()
+    }
+}
+
+impl Read for Connection {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let reading = async { timeout(self.read_timeout, self.stream.read(buffer)).await };
+        self.executor.block_on(reading).unwrap_or_else(|_| Err(io::ErrorKind::WouldBlock.into()))
+    }
+}
+
+impl Write for Connection {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let writing = async { timeout(LIMIT, self.stream.write(bytes)).await };
+        self.executor.block_on(writing).unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
     }
 }
 
 /// Starts a simulated array of eight rangers in the laboratory.
 pub fn start_array(folder: &Path, options: &[&str]) -> Daemon {
     Daemon::start(folder, &[&ARRAY[..], options].concat())
+}
+
+/// Starts a mock without noise whose transducer is 0.1 m ahead of the rotation axis, in a room where it can turn.
+pub fn start_ahead(folder: &Path, options: &[&str]) -> Daemon {
+    let ahead = ahead_options(folder);
+    let ahead: Vec<&str> = ahead.iter().map(String::as_str).collect();
+    Daemon::start(folder, &[&ahead[..], options].concat())
 }

@@ -1,7 +1,13 @@
 //! Accepts connections up to a limit, serves them with timeouts, and shuts them down.
 
 use std::{
-    error::Error as _, future::Future, io, net::IpAddr, pin::pin, sync::Arc, time::Duration,
+    error::Error as _,
+    future::{Future, pending},
+    io,
+    net::IpAddr,
+    pin::pin,
+    sync::Arc,
+    time::Duration,
 };
 
 use axum::extract::Request;
@@ -37,17 +43,30 @@ impl Server {
         let supervisor = self.daemon.supervisor().clone();
         let server = Arc::new(self);
         let mut accepting = Vec::new();
-        let Listeners { unix, tcp, keeper } = listeners;
+        let Listeners { unix, tcp, memory, keeper } = listeners;
         for listener in unix {
             let server = Arc::clone(&server);
-            let accept =
-                server.accept(Peer::Unix, shutdown.clone(), async move || listener.accept().await);
+            let accept = server.accept(shutdown.clone(), async move || {
+                let (stream, address) = listener.accept().await?;
+                Ok((stream, Peer::Unix, address))
+            });
             accepting.push(supervisor.spawn(Task::Server, accept));
         }
         for (listener, peer) in tcp {
             let server = Arc::clone(&server);
+            let accept = server.accept(shutdown.clone(), async move || {
+                let (stream, address) = listener.accept().await?;
+                Ok((stream, peer, address))
+            });
+            accepting.push(supervisor.spawn(Task::Server, accept));
+        }
+        if let Some(mut connections) = memory {
+            let server = Arc::clone(&server);
             let accept =
-                server.accept(peer, shutdown.clone(), async move || listener.accept().await);
+                server.accept(shutdown.clone(), async move || match connections.recv().await {
+                    Some((stream, peer)) => Ok((stream, peer, None)),
+                    None => pending().await,
+                });
             accepting.push(supervisor.spawn(Task::Server, accept));
         }
         let keeping = keeper.run(server.daemon.clone(), shutdown.clone());
@@ -65,9 +84,8 @@ impl Server {
     /// Accepts connections until shutdown, then waits for them to end.
     async fn accept<S: AsyncRead + AsyncWrite + Send + 'static>(
         self: Arc<Self>,
-        peer: Peer,
         shutdown: CancellationToken,
-        next: impl AsyncFn() -> io::Result<(S, Option<IpAddr>)>,
+        mut next: impl AsyncFnMut() -> io::Result<(S, Peer, Option<IpAddr>)>,
     ) {
         let mut connections = JoinSet::new();
         loop {
@@ -76,7 +94,7 @@ impl Server {
                 Some(_) = connections.join_next(), if !connections.is_empty() => continue,
                 accepted = next() => accepted,
             };
-            let Ok((stream, address)) = accepted else {
+            let Ok((stream, peer, address)) = accepted else {
                 // Out of file descriptors: retry once others are closed.
                 sleep(Duration::from_millis(100)).await;
                 continue;

@@ -10,7 +10,11 @@ use std::{io, net::SocketAddr, path::Path};
 use listenfd::ListenFd;
 use sonard_api::config::ServerKeys;
 use thiserror::Error;
-use tokio::net::{TcpListener, UnixListener};
+use tokio::{
+    io::DuplexStream,
+    net::{TcpListener, UnixListener},
+    sync::mpsc::UnboundedReceiver,
+};
 
 use super::Peer;
 
@@ -28,6 +32,7 @@ const LISTEN: &str = "server.listen";
 pub struct Listeners {
     pub(super) unix: Vec<DynamicListener<UnixListener>>,
     pub(super) tcp: Vec<(DynamicListener<TcpListener>, Peer)>,
+    pub(super) memory: Option<UnboundedReceiver<(DuplexStream, Peer)>>,
     pub(super) keeper: Keeper,
 }
 
@@ -70,6 +75,13 @@ impl ListenError {
 }
 
 impl Listeners {
+    /// Returns listeners without sockets: connections are the server's ends of pipes in memory,
+    /// each with the kind of client at the other end.
+    #[must_use]
+    pub fn in_memory(connections: UnboundedReceiver<(DuplexStream, Peer)>) -> Self {
+        Self { memory: Some(connections), ..Self::default() }
+    }
+
     /// Opens the sockets inherited from systemd, or else those of the configuration. An address not
     /// assigned yet or a port in use is bound later. Must be called within a tokio runtime.
     ///

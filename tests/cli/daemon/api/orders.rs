@@ -138,10 +138,10 @@ fn pending_changes() {
     let file = folder.path().join("s.toml");
     fs::write(&file, "[plan]\nto_deg = 360\n").expect("a file");
     let config = ["--config", file.to_str().expect("plain path"), "--set", "motion.settle_ms=50"];
-    let daemon = Daemon::start_mock(folder.path(), &config);
+    let mut daemon = InProcess::start_mock(folder.path(), &config);
     daemon.wait_for("ready");
     assert_eq!(daemon.send("POST", "/v1/start", r#"{"scans":1}"#).status, 202);
-    wait_until("beams", || daemon.status()["scan"]["done"].as_u64() >= Some(2));
+    daemon.wait_until("beams", || daemon.status()["scan"]["done"].as_u64() >= Some(2));
     assert_eq!(daemon.status()["pending"]["plan"], Value::Null);
     let half = json!({"from_deg": 0.0, "to_deg": 180.0, "step_deg": 0.9, "pings_per_stop": 1});
     for (path, body) in [
@@ -166,17 +166,16 @@ fn pending_changes() {
     assert_eq!((&plan["to_deg"], &plan["pending"]), (&json!(360.0), &half));
     assert_eq!(daemon.get("/v1/air").json()["pending"]["temperature_c"], 25.0);
     assert_eq!(daemon.get("/v1/pose").json()["pending"]["x_m"], 0.5);
-    let shown = run(&["status", "--socket", daemon.folder.join("s").to_str().expect("plain path")]);
-    let shown = String::from_utf8_lossy(&shown.stdout).into_owned();
+    let shown = String::from_utf8(daemon.run_client("status").stdout).expect("text");
     assert!(shown.contains("pending  with the next scan: sweep 0.0 to 180.0"), "{shown}");
 
     // The configuration that is read again, and what is wrong with it, likewise.
     fs::write(&file, "[plan]\nto_dge = 90\n").expect("a file");
-    daemon.signal(rustix::process::Signal::HUP);
-    wait_until("the refusal", || daemon.status()["configuration"]["error"].is_string());
+    daemon.reload();
+    daemon.wait_until("the refusal", || daemon.status()["configuration"]["error"].is_string());
     fs::write(&file, "[plan]\nto_deg = 90\n[motion]\nsettle_ms = 60\n").expect("a file");
-    daemon.signal(rustix::process::Signal::HUP);
-    wait_until("the new plan", || daemon.status()["pending"]["plan"]["to_deg"] == 90.0);
+    daemon.reload();
+    daemon.wait_until("the new plan", || daemon.status()["pending"]["plan"]["to_deg"] == 90.0);
     let status = daemon.status();
     assert_eq!(status["configuration"]["error"], Value::Null);
     assert_eq!(status["plan"]["to_deg"], 360.0);
@@ -184,10 +183,10 @@ fn pending_changes() {
 
     // Nothing is pending without a scan under way.
     assert_eq!(daemon.send("POST", "/v1/stop", "").status, 202);
-    wait_until("rest", || daemon.status()["scan"].is_null());
+    daemon.wait_until("rest", || daemon.status()["scan"].is_null());
     let status = daemon.status();
     assert_eq!(status["plan"]["to_deg"], 90.0);
     assert!(status["pending"].as_object().expect("an object").values().all(Value::is_null));
     assert_eq!(daemon.get("/v1/plan").json().get("pending"), None);
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 }

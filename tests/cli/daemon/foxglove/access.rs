@@ -6,6 +6,8 @@ use std::{
 };
 
 use serde_json::{Value, json};
+use sonard::server::Peer;
+use sonard_test_support::in_process::Daemon;
 use tungstenite::{
     Message,
     protocol::frame::{
@@ -15,11 +17,10 @@ use tungstenite::{
 };
 
 use super::{
-    super::{Daemon, send_request, write_token},
-    start,
-    viewer::{Came, Viewer, ask_for_viewer},
+    super::{send_request, write_token},
+    start, start_process,
+    viewer::{Came, Viewer, request_viewer},
 };
-use crate::common::{sonard, wait_until};
 
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 const PROTOCOL: (&str, &str) = ("sec-websocket-protocol", "foxglove.sdk.v1");
@@ -28,10 +29,8 @@ const PROTOCOL: (&str, &str) = ("sec-websocket-protocol", "foxglove.sdk.v1");
 fn access_rules_of_the_api() {
     let folder = tempfile::tempdir().expect("a folder");
     let token = format!("server.token_file={}", write_token(folder.path(), TOKEN).display());
-    let mut command = sonard(&[]);
-    command.env("SONARD_LOG", "trace");
-    let daemon = Daemon::start_as(
-        command,
+    let daemon = Daemon::start_at_level(
+        "trace",
         folder.path(),
         &[
             "--mock",
@@ -47,7 +46,6 @@ fn access_rules_of_the_api() {
             "foxglove.enabled=true",
         ],
     );
-    wait_until("the address", || daemon.messages().contains("http://"));
     let with_token = format!("/foxglove/?token={TOKEN}");
     let bearer = format!("Bearer {TOKEN}");
     for (path, headers, status) in [
@@ -67,48 +65,51 @@ fn access_rules_of_the_api() {
         ("/foxglove/", vec![PROTOCOL, ("sec-websocket-version", "8")], 400),
         ("/v1/live/records", vec![PROTOCOL, ("origin", "https://app.foxglove.dev")], 403),
     ] {
-        let requested = ask_for_viewer(daemon.connect_tcp(), path, &headers);
-        let answered = requested.as_ref().map_or_else(|refused| *refused, |_| 101);
+        let requested = request_viewer(daemon.connect_as(Peer::Loopback), path, &headers);
+        let answered = requested.as_ref().map_or_else(|rejected| *rejected, |_| 101);
         assert_eq!(answered, status, "{path} {headers:?}");
     }
     // No WebSocket at all.
-    let plain =
-        send_request(daemon.connect_tcp(), "GET", "/foxglove/", &[("Host", "localhost")], "");
+    let plain = send_request(
+        daemon.connect_as(Peer::Loopback),
+        "GET",
+        "/foxglove/",
+        &[("Host", "localhost")],
+        "",
+    );
     assert_eq!(plain.status, 400);
     assert!(plain.json()["help"].as_str().is_some_and(|help| help.contains("ws://")));
-    wait_until("they left", || daemon.status()["subscribers"]["now"] == 0);
+    daemon.wait_until("they left", || daemon.status()["subscribers"]["now"] == 0);
     let printed = daemon.messages();
     assert!(!printed.contains(TOKEN), "{printed}");
     assert_eq!(printed.matches("add the origin to foxglove.origins").count(), 1, "{printed}");
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 }
 
 #[test]
 fn key_and_viewer_limit() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = Daemon::start_mock(folder.path(), &[]);
-    let requested =
-        ask_for_viewer(daemon.connect().expect("it listens"), "/foxglove/", &[PROTOCOL]);
+    let requested = request_viewer(daemon.connect(), "/foxglove/", &[PROTOCOL]);
     assert_eq!(requested.err(), Some(404));
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 
     let second = tempfile::tempdir().expect("a folder");
     let by_tcp = ["--set", "foxglove.max_clients=3", "--set", "server.listen=127.0.0.1:0"];
     let daemon = start(second.path(), &by_tcp);
-    wait_until("the address", || daemon.messages().contains("http://"));
-    let connect = || daemon.connect().expect("it listens");
+    let connect = || daemon.connect();
     let mut viewers: Vec<_> = (0..3).map(|_| Viewer::new(connect(), "foxglove.sdk.v1")).collect();
-    assert_eq!(ask_for_viewer(connect(), "/foxglove/", &[PROTOCOL]).err(), Some(503));
+    assert_eq!(request_viewer(connect(), "/foxglove/", &[PROTOCOL]).err(), Some(503));
     // Guests have places of their own.
-    let guests = || ask_for_viewer(daemon.connect_tcp(), "/foxglove/", &[PROTOCOL]);
+    let guests = || request_viewer(daemon.connect_as(Peer::Loopback), "/foxglove/", &[PROTOCOL]);
     let came: Vec<_> = (0..4).map(|_| guests()).collect();
     assert_eq!(came.iter().filter(|one| one.is_ok()).count(), 3);
     drop(viewers.pop());
-    wait_until("a place", || ask_for_viewer(connect(), "/foxglove/", &[PROTOCOL]).is_ok());
+    daemon.wait_until("a place", || request_viewer(connect(), "/foxglove/", &[PROTOCOL]).is_ok());
     // Present viewers receive a close frame.
     let mut last = viewers.pop().expect("a viewer");
     drop((last.text(), last.text()));
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
     assert!(matches!(last.next(), Some(Came::End(1001))));
 }
 
@@ -117,13 +118,13 @@ fn key_and_viewer_limit() {
 fn connection_slots() {
     let folder = tempfile::tempdir().expect("a folder");
     let daemon = start(folder.path(), &["--set", "server.max_clients=4"]);
-    let connect = || daemon.connect().expect("it listens");
+    let connect = || daemon.connect();
     let viewers: Vec<_> = (0..4).map(|_| Viewer::new(connect(), "foxglove.sdk.v1")).collect();
     let full = || send_request(connect(), "GET", "/v1/status", &[("Host", "localhost")], "").status;
     assert_eq!(full(), 503);
     drop(viewers);
-    wait_until("places", || full() == 200);
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.wait_until("places", || full() == 200);
+    daemon.stop();
 }
 
 /// The words of the next status that refuses something.
@@ -139,7 +140,7 @@ fn refusal(viewer: &mut Viewer<impl Read + Write>) -> String {
 #[test]
 fn invalid_messages() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = start(folder.path(), &["--virtual-time"]);
+    let daemon = start_process(folder.path(), &["--virtual-time"]);
     daemon.wait_for("ready");
     let scan = || {
         let done = daemon.health()["scans"]["completed"].as_u64().expect("a count");

@@ -2,21 +2,23 @@
 
 use std::time::{Duration, Instant};
 
+use sonard_test_support::in_process::{Connection, Daemon};
+
 use super::{
-    super::{Daemon, own_kb},
+    super::{self as processes, own_kb},
     start,
     viewer::Viewer,
 };
 use crate::common::{cpu_s, wait_until};
 
-/// A daemon that scans without a rest, far faster than in real time.
+/// A daemon that scans without a rest.
 fn busy(folder: &std::path::Path, further: &[&str]) -> Daemon {
-    let scanning = ["--virtual-time", "--set", "scanning.mode=continuous"];
+    let scanning = ["--set", "scanning.mode=continuous"];
     start(folder, &[&scanning, further].concat())
 }
 
-fn viewer(daemon: &Daemon) -> Viewer<std::os::unix::net::UnixStream> {
-    let mut viewer = Viewer::new(daemon.connect().expect("it listens"), "foxglove.sdk.v1");
+fn viewer(daemon: &Daemon) -> Viewer<Connection> {
+    let mut viewer = Viewer::new(daemon.connect(), "foxglove.sdk.v1");
     viewer.wait_for_channels();
     viewer.subscribe_to_all();
     viewer
@@ -33,12 +35,12 @@ fn stalled_viewer_gets_a_count() {
     let before = daemon.health()["scans"]["completed"].as_u64().expect("a count");
     // More than sockets take in between.
     daemon.wait_for_scans(before + 40);
-    let reported = slow.for_a_while(Duration::from_secs(3));
+    let reported = slow.receive_for(Duration::from_secs(3));
     let left_out = |words: &String| words.ends_with(" messages left out");
     assert!(reported.words.iter().any(left_out), "{:?}", reported.words);
     assert!(reported.of("/sonar/range").count() > 0);
     drop(slow.until("/sonar/points"));
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 }
 
 #[test]
@@ -47,17 +49,19 @@ fn dead_viewers_are_disconnected() {
     let daemon = busy(folder.path(), &["--set", "server.write_timeout_s=3"]);
     let mut awake = viewer(&daemon);
     // Until as much waits as may.
-    drop(awake.for_a_while(Duration::from_secs(8)));
+    drop(awake.receive_for(Duration::from_secs(8)));
     let asleep: Vec<_> = (0..7).map(|_| viewer(&daemon)).collect();
     let cut_off = || daemon.status()["subscribers"]["cut_off"].as_u64();
-    let until = Instant::now() + Duration::from_secs(40);
-    while cut_off() != Some(7) && Instant::now() < until {
-        assert!(awake.for_a_while(Duration::from_millis(300)).of("/tf").count() > 0);
+    for _ in 0..130 {
+        if cut_off() == Some(7) {
+            break;
+        }
+        assert!(awake.receive_for(Duration::from_millis(300)).of("/tf").count() > 0);
     }
     assert_eq!(cut_off(), Some(7));
     assert_eq!(daemon.health()["scans"]["stopped"], 0);
     drop(asleep);
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 }
 
 /// Prints what one viewer of all topics costs a daemon that scans in real time: `--run-ignored all`.
@@ -73,17 +77,23 @@ fn figures_of_one_viewer() {
         "--set",
         "foxglove.enabled=true",
     ];
-    let daemon = Daemon::start_mock(folder.path(), &settings);
+    let daemon = processes::Daemon::start_mock(folder.path(), &settings);
     daemon.wait_for_scans(1);
-    let share = |daemon: &Daemon| {
+    let share = |daemon: &processes::Daemon| {
         let (before, since) = (cpu_s(daemon.id()), Instant::now());
         std::thread::sleep(Duration::from_secs(40));
         100.0 * (cpu_s(daemon.id()) - before) / since.elapsed().as_secs_f64()
     };
     let (alone, alone_kb) = (share(&daemon), own_kb(daemon.id()));
-    let mut viewer = viewer(&daemon);
+    let connection = daemon.connect().expect("it listens");
+    let mut viewer = Viewer::new(connection, "foxglove.sdk.v1");
+    viewer.wait_for_channels();
+    viewer.subscribe_to_all();
     let watching = std::thread::spawn(move || {
-        let reported = viewer.for_a_while(Duration::from_secs(45));
+        let reported = {
+            let until = Instant::now() + Duration::from_secs(45);
+            viewer.receive_while(|_| Instant::now() < until)
+        };
         let topics: Vec<String> = reported
             .topics()
             .map(|topic| format!("{topic} {}", reported.of(topic).count()))

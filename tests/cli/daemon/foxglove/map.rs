@@ -1,8 +1,16 @@
 //! The map for viewers, compared with `sonard map` of the log.
 
-use std::{fs, path::Path, time::Duration};
+use std::{
+    fs,
+    os::unix::net::UnixStream,
+    path::Path,
+    time::{Duration, Instant},
+};
 
-use super::{Daemon, start, viewer::Viewer};
+use super::{
+    super as processes, start,
+    viewer::{Received, Viewer},
+};
 use crate::common::{run, stderr};
 
 const MAP: &str = "/map";
@@ -20,9 +28,9 @@ fn made_of_log(folder: &Path) -> Vec<u8> {
 #[test]
 fn live_map_matches_the_log() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = start(folder.path(), &["--virtual-time", "--set", "foxglove.map=true"]);
+    let daemon = start(folder.path(), &["--set", "foxglove.map=true"]);
     daemon.wait_for("ready");
-    let mut viewer = Viewer::new(daemon.connect().expect("it listens"), "foxglove.sdk.v1");
+    let mut viewer = Viewer::new(daemon.connect(), "foxglove.sdk.v1");
     let mut reported = Vec::new();
     // From place to place, so that it gets larger; from the sixth scan on each counts once.
     for (scan, x_m) in (1..).zip([0.774, 0.2, 0.5, 0.85, 0.774, 0.35]) {
@@ -40,12 +48,12 @@ fn live_map_matches_the_log() {
     let last = reported.last().expect("six").clone();
     assert!(reported.windows(2).all(|pair| pair[0] != pair[1]), "each scan changes it");
     // Who comes late gets it, too.
-    let mut late = Viewer::new(daemon.connect().expect("it listens"), "foxglove.sdk.v1");
+    let mut late = Viewer::new(daemon.connect(), "foxglove.sdk.v1");
     late.wait_for_channels();
     late.subscribe_to_all();
-    let kept = late.for_a_while(Duration::from_secs(1));
+    let kept = late.receive_for(Duration::from_secs(1));
     assert!(kept.of(MAP).map(|(_, bytes)| bytes).eq([&last[..]]));
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
     assert!(last == made_of_log(folder.path()), "cell for cell");
 }
 
@@ -61,7 +69,7 @@ fn too_large_map() {
     let keys = keys.iter().flat_map(|key| ["--set", key]);
     let mock = ["--mock", "--virtual-time", "--scene", scene, "--pose", "0,0,0"];
     let options: Vec<&str> = mock.into_iter().chain(keys).collect();
-    let daemon = Daemon::start(folder.path(), &options);
+    let daemon = processes::Daemon::start(folder.path(), &options);
     daemon.wait_for("ready");
     let mut viewer = Viewer::new(daemon.connect().expect("it listens"), "foxglove.sdk.v1");
     let take = |scan: u64, x_m: f64| {
@@ -75,14 +83,25 @@ fn too_large_map() {
     viewer.subscribe_to_all();
     drop(viewer.until(MAP));
     take(2, 390.0);
-    let reported = viewer.for_a_while(Duration::from_secs(2));
+    let reported = receive_for(&mut viewer, Duration::from_secs(2));
     let printed =
         |words: &String| words.contains("live map stopped") && words.contains("sonard map");
     assert!(reported.words.iter().any(printed), "{:?}", reported.words);
     assert_eq!((reported.of(MAP).count(), reported.of("/sonar/points").count()), (0, 1));
     take(3, -390.0);
-    let reported = viewer.for_a_while(Duration::from_secs(2));
+    let reported = receive_for(&mut viewer, Duration::from_secs(2));
     assert!(!reported.words.iter().any(printed), "reported once: {:?}", reported.words);
     assert_eq!((reported.of(MAP).count(), reported.of("/sonar/points").count()), (0, 1));
     assert_eq!(daemon.stop(), Some(0));
+}
+
+/// All that comes from a process within a span of time.
+fn receive_for(viewer: &mut Viewer<UnixStream>, span: Duration) -> Received {
+    let until = Instant::now() + span;
+    let limit = Some(Duration::from_millis(200));
+    viewer.socket.get_ref().set_read_timeout(limit).expect("a socket");
+    let reported = viewer.receive_while(|_| Instant::now() < until);
+    let limit = Some(Duration::from_secs(20));
+    viewer.socket.get_ref().set_read_timeout(limit).expect("a socket");
+    reported
 }

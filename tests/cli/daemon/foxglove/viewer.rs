@@ -3,10 +3,11 @@
 use std::{
     collections::BTreeMap,
     io::{Read, Write},
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use serde_json::{Value, json};
+use sonard_test_support::in_process::Connection;
 use tungstenite::{
     Message, WebSocket,
     client::IntoClientRequest as _,
@@ -56,7 +57,7 @@ impl Received {
 }
 
 /// Opens a viewer's WebSocket with further headers; returns the status if it is rejected.
-pub(crate) fn ask_for_viewer<S: Read + Write>(
+pub(crate) fn request_viewer<S: Read + Write>(
     stream: S,
     path: &str,
     headers: &[(&'static str, &str)],
@@ -74,7 +75,7 @@ pub(crate) fn ask_for_viewer<S: Read + Write>(
 impl<S: Read + Write> Viewer<S> {
     pub(crate) fn new(stream: S, protocol: &str) -> Self {
         let requested =
-            ask_for_viewer(stream, "/foxglove/", &[("sec-websocket-protocol", protocol)]);
+            request_viewer(stream, "/foxglove/", &[("sec-websocket-protocol", protocol)]);
         let (socket, response) = requested.expect("it may come");
         let chosen = response.headers()["sec-websocket-protocol"].to_str().expect("text");
         let protocol = chosen.to_owned();
@@ -176,24 +177,28 @@ impl<S: Read + Write> Viewer<S> {
     }
 }
 
-impl Viewer<std::os::unix::net::UnixStream> {
-    /// All that comes within a while.
-    pub(crate) fn for_a_while(&mut self, while_: Duration) -> Received {
-        let (mut reported, until) = (Received::default(), Instant::now() + while_);
-        self.wait_at_most(Duration::from_millis(200));
-        while Instant::now() < until {
-            match self.next() {
-                Some(came) => self.take(came, &mut reported),
-                // Nothing for the moment.
-                None => continue,
+impl<S: Read + Write> Viewer<S> {
+    /// All that comes while the condition holds.
+    pub(crate) fn receive_while(&mut self, condition: impl Fn(&S) -> bool) -> Received {
+        let mut reported = Received::default();
+        while condition(self.socket.get_ref()) {
+            // Without a message within the connection's read timeout, the condition decides.
+            if let Some(came) = self.next() {
+                self.take(came, &mut reported);
             }
         }
-        self.wait_at_most(Duration::from_secs(20));
         reported
     }
+}
 
-    fn wait_at_most(&self, wait: Duration) {
-        self.socket.get_ref().set_read_timeout(Some(wait)).expect("a socket");
+impl Viewer<Connection> {
+    /// All that comes within a span of simulated time.
+    pub(crate) fn receive_for(&mut self, span: Duration) -> Received {
+        let until = self.socket.get_ref().now() + span;
+        self.socket.get_mut().set_read_timeout(Duration::from_millis(200));
+        let reported = self.receive_while(|connection| connection.now() < until);
+        self.socket.get_mut().set_read_timeout(Duration::from_secs(20));
+        reported
     }
 }
 
