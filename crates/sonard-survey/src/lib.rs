@@ -38,6 +38,7 @@ mod result;
 mod rows;
 mod search;
 mod slam;
+mod spots;
 mod survey;
 #[cfg(test)]
 mod tests;

@@ -78,9 +78,10 @@ pub struct WallPiece {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PieceStatus {
-    /// The path of an explained arc is reflected there, and plans without the wall score worse.
+    /// Inside the Fresnel zone of a mirror reflection by which an arc is explained, on a wall that
+    /// echoes from two sweeps or more determine and without which every plan found scores worse.
     Observed,
-    /// No path is reflected there, but the plan without the stretch scores more than 3 nats worse.
+    /// Outside of such zones, but the plan without the stretch scores more than 3 nats worse.
     Implied,
     /// The readings hardly depend on it.
     Conjectured,

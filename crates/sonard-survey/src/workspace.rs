@@ -48,6 +48,11 @@ impl<'a> Workspace<'a> {
         self.simulator.receiver().max_range_m
     }
 
+    /// Wavelength of the ranger, metres.
+    pub(crate) fn wavelength_m(&self) -> f64 {
+        self.world.air.sound_speed_m_s() / self.world.sensor.frequency_hz
+    }
+
     /// Counts a scored scene.
     pub(crate) fn count(&self) {
         self.scored.fetch_add(1, Ordering::Relaxed);
