@@ -100,6 +100,13 @@ fn survey_reconstructs_room_and_course() {
     assert!(read("report.md").contains("![Floor plan](plan.png)"));
     assert!(read("plan.svg").contains("observed wall"));
 
+    // Without odometry, the room looks alike from two poses half a turn apart.
+    let blind = path(folder.path(), "blind");
+    let mut without = vec!["survey", "--no-odometry", "--out", &blind, "--max-range", "4"];
+    without.extend(logs.iter().map(String::as_str));
+    let printed = succeeds(&without);
+    assert!(printed.contains("3 sweeps explained as well by other poses"), "{printed}");
+
     // The scene is one for other verbs, in which readings agree and are found again.
     let scene = path(Path::new(&out), "scene.json");
     succeeds(&["scene", "check", &scene]);

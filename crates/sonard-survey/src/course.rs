@@ -45,6 +45,7 @@ pub fn map_course(
             pose: *pose,
             sigma_m: sigma.map(|[x, y, _]| [x, y]),
             sigma_heading_deg: sigma.map(|[.., heading_rad]| heading_rad.to_degrees()),
+            equivalent: Vec::new(),
         }
     });
     let features = map.features.iter().map(|of| (of.feature, of.arcs.len()));

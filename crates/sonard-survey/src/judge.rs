@@ -84,12 +84,21 @@ impl<'a> Judge<'a> {
     pub(crate) fn log_likelihood(&self, segments: &[Segment]) -> f64 {
         self.workspace.count();
         let Some(simulator) = self.simulator_of(segments) else { return UNSCORED };
-        let of_sweep = |(readings, pose): (&Readings, &Pose)| {
-            let predicted = predict(&simulator, readings, pose)?;
-            Some(self.of_sweep(readings, &predicted))
-        };
-        let sum: Option<f64> = self.readings().iter().zip(&self.poses).map(of_sweep).sum();
+        let of_sweep = |(sweep, pose)| self.log_likelihood_of(&simulator, sweep, pose);
+        let sum: Option<f64> = self.poses.iter().enumerate().map(of_sweep).sum();
         sum.unwrap_or(UNSCORED)
+    }
+
+    /// Log-likelihood of the readings of one sweep from a pose, nats; `None` if the scene has more
+    /// paths than the model follows.
+    pub(crate) fn log_likelihood_of(
+        &self,
+        simulator: &Simulator,
+        sweep: usize,
+        pose: &Pose,
+    ) -> Option<f64> {
+        let readings = &self.readings()[sweep];
+        Some(self.of_sweep(readings, &predict(simulator, readings, pose)?))
     }
 
     fn of_sweep(&self, readings: &Readings, predicted: &[Prediction]) -> f64 {

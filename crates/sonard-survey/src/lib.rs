@@ -40,6 +40,7 @@ mod search;
 mod slam;
 mod spots;
 mod survey;
+mod symmetry;
 #[cfg(test)]
 mod tests;
 mod trace;

@@ -88,7 +88,7 @@ pub enum PieceStatus {
 }
 
 /// Pose of a sweep.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SurveyedPose {
     /// Scan of the sweep.
     pub scan: Uuid,
@@ -98,6 +98,9 @@ pub struct SurveyedPose {
     pub sigma_m: Option<[f64; 2]>,
     /// Standard deviation of the heading, degrees.
     pub sigma_heading_deg: Option<f64>,
+    /// Other poses that explain the sweep as well, within 10 nats, because the room looks alike
+    /// from them.
+    pub equivalent: Vec<Pose>,
 }
 
 /// Arc that the plan does not explain.

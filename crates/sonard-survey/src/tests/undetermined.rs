@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::{
-    alternatives::assess, judge::Judge, posed::PosedPlan, progress::NoObserver, result::PieceStatus,
+    alternatives::assess, judge::Judge, posed::PosedPlan, progress::NoObserver,
+    result::PieceStatus, symmetry::equivalent_poses,
 };
 
 /// A wall behind the walls of a closed room can't be observed, and neither can a wall across the
@@ -34,5 +35,29 @@ fn wall_without_evidence_is_never_observed() {
         }
         // The plan without it is better.
         assert!(assessment.better.is_some());
+    }
+}
+
+/// A rectangle looks alike from two poses half a turn apart; odometry excludes one of them.
+#[test]
+fn half_turn_of_a_rectangle_is_open_without_odometry() {
+    let (corners, poses) = (rectangle(), stops());
+    let world = world(&corners);
+    let sweeps = sweeps(&world, &poses, &poses);
+    let (plan, walls) = plan_of(&sides(&corners), &poses);
+    let posed = PosedPlan { plan, walls, poses: poses.clone() };
+    for odometry in [None, options().odometry] {
+        let options = SurveyOptions { odometry, ..options() };
+        let workspace = workspace(&world, &sweeps, &options, &NoObserver).expect("sweeps");
+        let found = equivalent_poses(&posed, &Judge::new(&workspace, &poses, 0.004));
+        assert!(found[0].is_empty());
+        let (center, is_open) = (corners[0].midpoint(corners[2]), odometry.is_none());
+        for (equivalent, pose) in found.iter().zip(&poses).skip(1) {
+            assert_eq!(equivalent.len(), usize::from(is_open), "{equivalent:?}");
+            for other in equivalent {
+                assert!(other.position().distance(2.0 * center - pose.position()) < 1e-6);
+                assert!((other.heading_deg - pose.heading_deg).abs() - 180.0 < 1e-6);
+            }
+        }
     }
 }
