@@ -16,6 +16,7 @@ use sonard_model::{
 use crate::{
     arrangement::{JOINED_M, LineArrangement, PieceSet, Segment},
     readings::{Outcome, Readings},
+    scores::plan_digest,
     workspace::Workspace,
 };
 
@@ -83,10 +84,13 @@ impl<'a> Judge<'a> {
     /// Log-likelihood of all readings, with the readings of an arc as one, nats.
     pub(crate) fn log_likelihood(&self, segments: &[Segment]) -> f64 {
         self.workspace.count();
-        let Some(simulator) = self.simulator_of(segments) else { return UNSCORED };
-        let of_sweep = |(sweep, pose)| self.log_likelihood_of(&simulator, sweep, pose);
-        let sum: Option<f64> = self.poses.iter().enumerate().map(of_sweep).sum();
-        sum.unwrap_or(UNSCORED)
+        let sum = || {
+            let simulator = self.simulator_of(segments)?;
+            let of_sweep = |(sweep, pose)| self.log_likelihood_of(&simulator, sweep, pose);
+            self.poses.iter().enumerate().map(of_sweep).sum::<Option<f64>>()
+        };
+        let plan = plan_digest(segments, &self.poses, self.sigma_m);
+        self.workspace.scores.get_or(plan, || sum().unwrap_or(UNSCORED))
     }
 
     /// Log-likelihood of the readings of one sweep from a pose, nats; `None` if the scene has more

@@ -67,7 +67,7 @@ fn motions(segments: &[Segment]) -> Vec<Motion> {
 }
 
 /// Negative log-density of the moves to and from a sweep with another pose, nats.
-fn odometry_loss(posed: &PosedPlan, judge: &Judge, sweep: usize, pose: &Pose) -> f64 {
+pub(crate) fn odometry_loss(posed: &PosedPlan, judge: &Judge, sweep: usize, pose: &Pose) -> f64 {
     let moves = &judge.workspace.moves;
     let before = moves.get(sweep - 1).map(|step| step.loss(&posed.poses[sweep - 1], pose));
     let after = moves.get(sweep).zip(posed.poses.get(sweep + 1));

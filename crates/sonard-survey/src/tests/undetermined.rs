@@ -13,7 +13,8 @@ fn wall_without_evidence_is_never_observed() {
     let (corners, poses) = (rectangle(), stops());
     let world = world(&corners);
     let sweeps = sweeps(&world, &poses, &poses);
-    let workspace = true_workspace(&world, &sweeps, &NoObserver);
+    let scores = PlanScores::default();
+    let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
     let judge = Judge::new(&workspace, &poses, 0.004);
     let along = (corners[1] - corners[0]).normalize();
     let behind = [corners[0] - 0.5 * along.perp(), corners[1] - 0.5 * along.perp()];
@@ -47,8 +48,10 @@ fn half_turn_of_a_rectangle_is_open_without_odometry() {
     let (plan, walls) = plan_of(&sides(&corners), &poses);
     let posed = PosedPlan { plan, walls, poses: poses.clone() };
     for odometry in [None, options().odometry] {
+        let scores = PlanScores::default();
         let options = SurveyOptions { odometry, ..options() };
-        let workspace = workspace(&world, &sweeps, &options, &NoObserver).expect("sweeps");
+        let workspace =
+            workspace(&world, &sweeps, &options, (&NoObserver, &scores)).expect("sweeps");
         let found = equivalent_poses(&posed, &Judge::new(&workspace, &poses, 0.004));
         assert!(found[0].is_empty());
         let (center, is_open) = (corners[0].midpoint(corners[2]), odometry.is_none());
