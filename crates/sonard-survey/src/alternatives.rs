@@ -55,7 +55,10 @@ pub(crate) fn assess(posed: &PosedPlan, judge: &Judge) -> Assessment {
         if let Some(other) = other {
             assessment.add(plan, &best, &other);
         }
-        let is_needed = lead_nats.min(evidence_nats) > IMPLIED_NATS;
+        let lead_nats = lead_nats.min(evidence_nats);
+        // A wall that a listed alternative lacks is not observed.
+        let observed = if lead_nats > LISTED_NATS { observed } else { Vec::new() };
+        let is_needed = lead_nats > IMPLIED_NATS;
         let pieces = pieces(plan, judge, &best, &run, &observed, is_needed);
         let segment = plan.segment(&run);
         assessment.walls.push(JudgedWall { run, segment, evidence_nats, pieces });
@@ -120,10 +123,12 @@ fn pieces(
         };
         let [from_m, to_m] = [at, at + 1].map(|cut| plan.cuts[run.line][cut].along_m);
         for (range_m, is_observed) in split([from_m, to_m], observed) {
-            let status = match is_observed && is_needed {
-                true => PieceStatus::Observed,
-                false if is_implied() => PieceStatus::Implied,
-                false => PieceStatus::Conjectured,
+            let status = if is_observed {
+                PieceStatus::Observed
+            } else if is_implied() {
+                PieceStatus::Implied
+            } else {
+                PieceStatus::Conjectured
             };
             let [from_m, to_m] = range_m.map(|along_m| line.at(along_m).to_array());
             match found.last_mut().filter(|last| last.status == status) {

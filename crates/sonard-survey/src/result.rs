@@ -79,7 +79,7 @@ pub struct WallPiece {
 #[serde(rename_all = "snake_case")]
 pub enum PieceStatus {
     /// Inside the Fresnel zone of a mirror reflection by which an arc is explained, on a wall that
-    /// echoes from two sweeps or more determine and without which every plan found scores worse.
+    /// echoes from two sweeps or more determine and no listed alternative lacks.
     Observed,
     /// Outside of such zones, but the plan without the stretch scores more than 3 nats worse.
     Implied,

@@ -3,12 +3,12 @@
 use std::collections::BTreeSet;
 
 use sonard_model::{
-    geometry::DVec2,
-    model::{Diffractor, Edge, Mechanism, Path, Reflector},
+    geometry::{DVec2, distance_to_segment},
+    model::{Mechanism, Path, Reflector},
 };
 
 use crate::{
-    arrangement::{JOINED_M, LineArrangement, PieceSet, Run, Segment},
+    arrangement::{JOINED_M, LineArrangement, PieceSet, Run},
     judge::Judge,
     options::EXPLAINED_M,
     trace::explain,
@@ -42,8 +42,9 @@ struct MirrorEcho {
 /// and apart.
 ///
 /// Echoes of a single reflection, and those of several whose other walls are determined, count. A
-/// wall is determined by such echoes from two sweeps or more. At a free end from which no
-/// diffracted echo comes, the stretch ends with the last point of reflection.
+/// wall is determined by such echoes from two sweeps or more. At an end without a corner with
+/// another determined wall, a stretch ends half a zone before the last point of reflection: an edge
+/// that near returns an echo of nearly the same range.
 pub(crate) fn observed_stretches(
     plan: &LineArrangement,
     walls: &PieceSet,
@@ -54,47 +55,31 @@ pub(crate) fn observed_stretches(
         return vec![Vec::new(); runs.len()];
     };
     let wavelength_m = judge.workspace.wavelength_m();
-    let (mut echoes, mut edges) = (Vec::new(), BTreeSet::new());
+    let mut echoes = Vec::new();
     for arc in judge.workspace.arcs.iter().flatten() {
         let (readings, predictions) = (&judge.readings()[arc.sweep], &predictions[arc.sweep]);
         let explained = explain(arc, readings, predictions, EXPLAINED_M, SHARE);
         let Some(path) = explained.as_ref().and_then(|explained| explained.path()) else {
             continue;
         };
-        edges.extend(path.diffractors().filter_map(|of| match of {
-            Diffractor::Upright(edge) => Some(edge),
-            _ => None,
-        }));
         let place = judge.poses[arc.sweep].position();
         if let Some(reflections) = mirror_spots(plan, &runs, path, place, wavelength_m) {
             echoes.push(MirrorEcho { sweep: arc.sweep, reflections });
         }
     }
     let spots = determined_spots(&echoes, runs.len());
-    let stretches = spots.iter().zip(&runs).enumerate().map(|(at, (spots, run))| {
+    let is_corner = |at: usize, end: DVec2| {
+        let mut others = segments.iter().zip(&spots).enumerate();
+        others.any(|(other, (of, spots))| {
+            other != at && !spots.is_empty() && distance_to_segment(end, of.a, of.b) < JOINED_M
+        })
+    };
+    let stretches = runs.iter().enumerate().map(|(at, run)| {
         let line = &plan.lines[run.line];
-        let ends = [(segments[at].a, false), (segments[at].b, true)];
-        let ends = ends.map(|(end, at_b)| {
-            let is_end = |edge: &Edge| {
-                let of = segments.get(edge.wall as usize);
-                of.is_some_and(|of| end.distance(if edge.at_b { of.b } else { of.a }) < JOINED_M)
-            };
-            let is_explained = is_joined(&segments, at, end)
-                || edges.contains(&Edge { wall: at as u32, at_b })
-                || edges.iter().any(is_end);
-            (line.along_m(end), is_explained)
-        });
-        stretches_of(spots, ends)
+        let ends = [segments[at].a, segments[at].b];
+        stretches_of(&spots[at], ends.map(|end| (line.along_m(end), is_corner(at, end))))
     });
     stretches.collect()
-}
-
-/// Returns `true` if an end of a wall lies on another wall.
-fn is_joined(segments: &[Segment], at: usize, end: DVec2) -> bool {
-    let mut others = segments.iter().enumerate().filter(|(other, _)| *other != at);
-    others.any(|(_, other)| {
-        sonard_model::geometry::distance_to_segment(end, other.a, other.b) < JOINED_M
-    })
 }
 
 /// Walls and spots of a path of mirror reflections by walls; `None` for any other path.
@@ -154,12 +139,12 @@ fn determined_spots(echoes: &[MirrorEcho], walls: usize) -> Vec<Vec<Spot>> {
     }
 }
 
-/// Union of spots between two ends, each with `true` if an echo or a corner explains it.
+/// Union of spots between two ends, each with `true` at a corner.
 fn stretches_of(spots: &[Spot], ends: [(f64, bool); 2]) -> Vec<[f64; 2]> {
-    let points = || spots.iter().map(|spot| spot.along_m);
+    let inner = |side: f64| spots.iter().map(move |spot| spot.along_m + side * spot.half_m);
     let [from, to] = ends;
-    let low_m = if from.1 { from.0 } else { from.0.max(points().fold(f64::INFINITY, f64::min)) };
-    let high_m = if to.1 { to.0 } else { to.0.min(points().fold(f64::NEG_INFINITY, f64::max)) };
+    let low_m = if from.1 { from.0 } else { inner(1.0).fold(f64::INFINITY, f64::min) };
+    let high_m = if to.1 { to.0 } else { inner(-1.0).fold(f64::NEG_INFINITY, f64::max) };
     let mut all: Vec<[f64; 2]> = spots
         .iter()
         .map(|spot| {
@@ -211,11 +196,13 @@ mod tests {
     }
 
     #[test]
-    fn spots_end_at_explained_ends_only() {
+    fn spots_reach_corners_but_no_free_ends() {
         let spots = [0.5, 0.6, 1.5].map(|along_m| Spot { along_m, half_m: 0.1 });
         let [a, b] = [(0.45, true), (1.55, false)];
-        assert_eq!(stretches_of(&spots, [a, b]), [[0.45, 0.7], [1.4, 1.5]]);
-        assert_eq!(stretches_of(&spots, [(0.45, false), b])[0][0], 0.5);
+        assert_eq!(stretches_of(&spots, [a, b]), [[0.45, 0.7]]);
+        let both = stretches_of(&spots, [(0.45, false), (1.55, true)]);
+        assert_eq!(both, [[0.6, 0.7], [1.4, 1.55]]);
+        assert_eq!(stretches_of(&spots[..1], [(0.45, false), b]), [[0.0; 2]; 0]);
         assert_eq!(stretches_of(&[], [a, b]), [[0.0; 2]; 0]);
     }
 

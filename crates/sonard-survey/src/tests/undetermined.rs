@@ -3,7 +3,7 @@
 use super::*;
 use crate::{
     alternatives::assess, judge::Judge, posed::PosedPlan, progress::NoObserver,
-    result::PieceStatus, symmetry::equivalent_poses,
+    relocate::relocated, result::PieceStatus, symmetry::equivalent_poses,
 };
 
 /// A wall behind the walls of a closed room can't be observed, and neither can a wall across the
@@ -63,4 +63,29 @@ fn half_turn_of_a_rectangle_is_open_without_odometry() {
             }
         }
     }
+}
+
+/// A pose far from the true one, by which the walls of the others explain nothing.
+#[test]
+fn lost_sweep_is_located_in_the_plan_of_the_others() {
+    let (corners, truth) = (rectangle(), stops());
+    let world = world(&corners);
+    let sweeps = sweeps(&world, &truth, &truth);
+    let options = SurveyOptions { odometry: None, ..options() };
+    let scores = PlanScores::default();
+    let workspace = workspace(&world, &sweeps, &options, (&NoObserver, &scores)).expect("sweeps");
+    let mut poses = truth.clone();
+    let posed = |poses: &[Pose]| {
+        let (plan, walls) = plan_of(&sides(&corners), poses);
+        PosedPlan { plan, walls, poses: poses.to_vec() }
+    };
+    assert_eq!(relocated(&posed(&truth), &Judge::new(&workspace, &truth, 0.004)), None);
+    poses[2] = Pose { x_m: truth[2].x_m - 0.3, y_m: truth[2].y_m - 0.2, heading_deg: 40.0 };
+    let found = relocated(&posed(&poses), &Judge::new(&workspace, &poses, 0.004));
+    let found = found.expect("a better pose");
+    // The room looks alike from the pose half a turn away.
+    let half_turn = 2.0 * corners[0].midpoint(corners[2]) - truth[2].position();
+    let off_m = [truth[2].position(), half_turn].map(|at| at.distance(found[2].position()));
+    assert!(off_m.iter().any(|off_m| *off_m < 0.005), "{off_m:?}");
+    assert_eq!([found[0], found[1], found[3]], [truth[0], truth[1], truth[3]]);
 }
