@@ -80,7 +80,7 @@ echoes of any order locate the sweeps, with odometry as prior. Walls are then pl
 through these features such that the model explains the readings best: echoes along any path, \
 missing echoes, minimum ranges. No scene is needed; one in the log is ignored.
 
-Each stretch of wall is observed (the path of an explained echo is reflected there), implied \
+Each stretch of wall is observed (explained echoes of two sweeps or more determine it there), implied \
 (plans without it explain less) or conjectured (left out of scene.json without --closed). Floor \
 plans that explain the readings nearly as well are listed with their probabilities. The frame is \
 the pose of the first sweep in the log. Dimensions follow the speed of sound: 0.17 % per degree.

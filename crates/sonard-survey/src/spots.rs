@@ -34,24 +34,26 @@ pub(crate) struct Spot {
 /// Echo of mirror reflections only.
 struct MirrorEcho {
     sweep: usize,
-    /// Wall and spot of each reflection.
+    /// Part of a wall and spot of each reflection.
     reflections: Vec<(usize, Spot)>,
 }
 
 /// Stretches of each wall of a plan, in the order of its runs, along its line in metres, ordered
 /// and apart.
 ///
-/// Echoes of a single reflection, and those of several whose other walls are determined, count. A
-/// wall is determined by such echoes from two sweeps or more. At an end without a corner with
-/// another determined wall, a stretch ends half a zone before the last point of reflection: an edge
-/// that near returns an echo of nearly the same range.
+/// Walls are divided where others end on them or cross them. Echoes of a single reflection, and
+/// those of several whose other walls are determined, count. A wall is determined by such echoes
+/// from two sweeps or more. At an end without a corner with another determined wall, a stretch ends
+/// half a zone before the last point of reflection: an edge that near returns an echo of nearly the
+/// same range.
 pub(crate) fn observed_stretches(
     plan: &LineArrangement,
     walls: &PieceSet,
     judge: &Judge,
 ) -> Vec<Vec<[f64; 2]>> {
-    let (runs, segments) = (plan.runs(walls), plan.segments(walls));
-    let Some((_, predictions)) = judge.predictions(&segments) else {
+    let runs = plan.runs(walls);
+    let parts = parts_of(plan, walls, &runs);
+    let Some((_, predictions)) = judge.predictions(&plan.segments(walls)) else {
         return vec![Vec::new(); runs.len()];
     };
     let wavelength_m = judge.workspace.wavelength_m();
@@ -63,32 +65,56 @@ pub(crate) fn observed_stretches(
             continue;
         };
         let place = judge.poses[arc.sweep].position();
-        if let Some(reflections) = mirror_spots(plan, &runs, path, place, wavelength_m) {
+        if let Some(reflections) = mirror_spots(plan, &runs, &parts, path, (place, wavelength_m)) {
             echoes.push(MirrorEcho { sweep: arc.sweep, reflections });
         }
     }
-    let spots = determined_spots(&echoes, runs.len());
-    let is_corner = |at: usize, end: DVec2| {
-        let mut others = segments.iter().zip(&spots).enumerate();
-        others.any(|(other, (of, spots))| {
-            other != at && !spots.is_empty() && distance_to_segment(end, of.a, of.b) < JOINED_M
+    let spots = determined_spots(&echoes, parts.len());
+    let is_corner = |of: &WallPart, along_m: f64| {
+        let end = plan.lines[runs[of.wall].line].at(along_m);
+        parts.iter().zip(&spots).any(|(other, spots)| {
+            let line = &plan.lines[runs[other.wall].line];
+            let [a, b] = other.range_m.map(|along_m| line.at(along_m));
+            other.wall != of.wall && !spots.is_empty() && distance_to_segment(end, a, b) < JOINED_M
         })
     };
-    let stretches = runs.iter().enumerate().map(|(at, run)| {
-        let line = &plan.lines[run.line];
-        let ends = [segments[at].a, segments[at].b];
-        stretches_of(&spots[at], ends.map(|end| (line.along_m(end), is_corner(at, end))))
-    });
-    stretches.collect()
+    let mut stretches = vec![Vec::new(); runs.len()];
+    for (part, spots) in parts.iter().zip(&spots) {
+        let ends = part.range_m.map(|along_m| (along_m, is_corner(part, along_m)));
+        stretches[part.wall].extend(stretches_of(spots, ends));
+    }
+    stretches
 }
 
-/// Walls and spots of a path of mirror reflections by walls; `None` for any other path.
+/// Part of a wall between others that end on it or cross it.
+struct WallPart {
+    wall: usize,
+    /// Range along the line, metres.
+    range_m: [f64; 2],
+}
+
+fn parts_of(plan: &LineArrangement, walls: &PieceSet, runs: &[Run]) -> Vec<WallPart> {
+    let mut parts = Vec::new();
+    for (wall, run) in runs.iter().enumerate() {
+        let cuts = &plan.cuts[run.line];
+        let is_met = |cut: &usize| plan.is_met(walls, run.line, *cut);
+        let inner = (run.first + 1..=run.last).filter(is_met).map(|cut| cuts[cut].along_m);
+        let mut from_m = cuts[run.first].along_m;
+        for to_m in inner.chain([cuts[run.last + 1].along_m]) {
+            parts.push(WallPart { wall, range_m: [from_m, to_m] });
+            from_m = to_m;
+        }
+    }
+    parts
+}
+
+/// Parts of walls and spots of a path of mirror reflections by walls; `None` for any other path.
 fn mirror_spots(
     plan: &LineArrangement,
     runs: &[Run],
+    parts: &[WallPart],
     path: &Path,
-    place: DVec2,
-    wavelength_m: f64,
+    (place, wavelength_m): (DVec2, f64),
 ) -> Option<Vec<(usize, Spot)>> {
     let points = path.polyline([place; 2]);
     let lengths_m: Vec<f64> = points.windows(2).map(|pair| pair[0].distance(pair[1])).collect();
@@ -105,7 +131,10 @@ fn mirror_spots(
         let along = (interaction.point - points[at]).normalize_or_zero();
         let cosine = along.dot(line.normal()).abs().max(MIN_COSINE);
         let half_m = fresnel_half_m(wavelength_m, before_m, whole_m - before_m) / cosine;
-        found.push((wall, Spot { along_m: line.along_m(interaction.point), half_m }));
+        let along_m = line.along_m(interaction.point);
+        let part = parts.iter().rposition(|of| of.wall == wall && of.range_m[0] <= along_m);
+        let part = part.or_else(|| parts.iter().position(|of| of.wall == wall))?;
+        found.push((part, Spot { along_m, half_m }));
     }
     Some(found)
 }
@@ -115,12 +144,12 @@ fn fresnel_half_m(wavelength_m: f64, before_m: f64, after_m: f64) -> f64 {
     (wavelength_m * before_m * after_m / (before_m + after_m).max(1e-9)).sqrt()
 }
 
-/// Spots of each wall by echoes that determine it.
-fn determined_spots(echoes: &[MirrorEcho], walls: usize) -> Vec<Vec<Spot>> {
-    let mut is_determined = vec![false; walls];
+/// Spots of each part of a wall by echoes that determine it.
+fn determined_spots(echoes: &[MirrorEcho], parts: usize) -> Vec<Vec<Spot>> {
+    let mut is_determined = vec![false; parts];
     loop {
-        let mut spots = vec![Vec::new(); walls];
-        let mut sweeps = vec![BTreeSet::new(); walls];
+        let mut spots = vec![Vec::new(); parts];
+        let mut sweeps = vec![BTreeSet::new(); parts];
         for echo in echoes {
             for (wall, spot) in &echo.reflections {
                 let mut others = echo.reflections.iter().filter(|(other, _)| other != wall);

@@ -98,13 +98,17 @@ pub(super) fn save(
     overwrite.save(&folder.join(NAME), HEAD_KEYS, lines.concat().as_bytes())
 }
 
-/// Deletes the file of a survey that is complete.
+/// Deletes the file of a survey that is complete; a file of another kind remains.
 ///
 /// # Errors
 ///
 /// The file can't be deleted.
 pub(super) fn remove(folder: &Path) -> Outcome {
     let path = folder.join(NAME);
+    let text = fs::read_to_string(&path).unwrap_or_default();
+    if serde_json::from_str::<Head>(text.lines().next().unwrap_or_default()).is_err() {
+        return Ok(());
+    }
     match fs::remove_file(&path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => {
             Err(Failure::unwritable(&path.display(), &error))
