@@ -13,7 +13,7 @@ use std::{error::Error, sync::Arc};
 use sonard_inverse::World;
 use sonard_model::{
     acoustics::{Air, Sensor},
-    geometry::{DVec2, Pose},
+    geometry::{DVec2, Pose, wrap_180},
     model::Options,
     scene::Scene,
 };
@@ -57,6 +57,8 @@ struct Trial {
     lead_nats: f64,
     /// Length of walls reported as observed that are none, metres.
     wrong_observed_m: f64,
+    /// Numbers of poses and corners whose 95 % interval holds the truth, each with that of all.
+    intervals: [[usize; 2]; 2],
     /// An alternative is the true room.
     is_listed: bool,
     end: SearchEnd,
@@ -106,7 +108,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 const HEAD: &str = "| kind | rooms | complete | recall | precision | corner mm | position mm | heading deg | \
-held | true room | score within 5 | wrong observed m | outer recall | faces found | CPU s | scenes |";
+held | true room | score within 5 | wrong observed m | outer recall | faces found | 95 % of poses | 95 % of corners | CPU s | scenes |";
 
 fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn Error>> {
     let mut random = generator(kind, seed);
@@ -154,6 +156,8 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
     if settings.prints_walls {
         print_walls(&found, &motion, &truth);
     }
+    // The frame of the survey is the first pose of odometry, which is the true one.
+    let intervals = [pose_intervals(&found, &poses), corner_intervals(&found, &truth)];
     let scene = found.scene("found", false).build()?;
     let (outer, inner): (Vec<Ends>, Vec<Ends>) = {
         let mut inner = Vec::new();
@@ -189,6 +193,7 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
         true_held: explained(&world, Scene::clone(&world.scene), &held_out, |sweep| sweep.pose)?,
         lead_nats: found.score - true_score,
         wrong_observed_m: wrong,
+        intervals,
         is_listed,
         end: found.end,
         scenes: found.scored_scenes,
@@ -212,6 +217,40 @@ fn nearest_poses(found: &Survey, truth: &[Pose]) -> Vec<Pose> {
     }
     let off_m = |poses: &Vec<Pose>| RigidMotion::between(poses, truth).pose_errors(poses, truth)[0];
     all.into_iter().min_by(|a, b| off_m(a).total_cmp(&off_m(b))).unwrap_or_default()
+}
+
+/// Numbers of coordinates of poses within 1.96 standard deviations of the truth, and of all.
+fn pose_intervals(found: &Survey, truth: &[Pose]) -> [usize; 2] {
+    const NORMAL_95: f64 = 1.96;
+    let deviations = found.poses.iter().zip(truth).skip(1).filter_map(|(of, truth)| {
+        let [x_m, y_m] = of.sigma_m?;
+        let turn_deg = wrap_180(of.pose.heading_deg - truth.heading_deg);
+        Some([
+            (of.pose.x_m - truth.x_m) / x_m,
+            (of.pose.y_m - truth.y_m) / y_m,
+            turn_deg / of.sigma_heading_deg?,
+        ])
+    });
+    let inside: Vec<bool> = deviations.flatten().map(|off| off.abs() <= NORMAL_95).collect();
+    [inside.iter().filter(|is_inside| **is_inside).count(), inside.len()]
+}
+
+/// Numbers of ends of walls at a true corner within the 95 % ellipse, and of all with a covariance.
+fn corner_intervals(found: &Survey, truth: &[Ends]) -> [usize; 2] {
+    /// Quantile of the chi-square distribution with two degrees of freedom.
+    const CHI_SQUARE_95: f64 = 5.991;
+    const NEAR_M: f64 = 0.02;
+    let ends = found.walls.iter().flat_map(|wall| [&wall.from, &wall.to]);
+    let inside = ends.filter_map(|end| {
+        let [xx, xy, yy] = end.covariance_m2?;
+        let corners = truth.iter().flatten().map(|corner| DVec2::from(end.at_m) - *corner);
+        let off = corners.min_by(|a, b| a.length().total_cmp(&b.length()))?;
+        let square = yy * off.x * off.x - 2.0 * xy * off.x * off.y + xx * off.y * off.y;
+        let square = square / (xx * yy - xy * xy);
+        (off.length() < NEAR_M).then_some(square <= CHI_SQUARE_95)
+    });
+    let inside: Vec<bool> = inside.collect();
+    [inside.iter().filter(|is_inside| **is_inside).count(), inside.len()]
 }
 
 /// CPU time of all threads so far, seconds (Linux).
@@ -277,10 +316,14 @@ fn print_summary(kind: RoomKind, trials: &[Trial]) {
     let count = trials.len().max(1) as f64;
     let mean = |of: &dyn Fn(&Trial) -> f64| trials.iter().map(of).sum::<f64>() / count;
     let middle = |of: &dyn Fn(&Trial) -> f64| median(trials.iter().map(of).collect());
+    let intervals = |of: usize| {
+        let sum = |at: usize| trials.iter().map(|trial| trial.intervals[of][at]).sum::<usize>();
+        sum(0) as f64 / sum(1).max(1) as f64
+    };
     let corners: Vec<f64> =
         trials.iter().flat_map(|trial| trial.corners_m.iter().copied()).collect();
     println!(
-        "| {kind} | {} | {} | {:.3} | {:.3} | {:.2} | {:.2} | {:.3} | {:.3} | {:.3} | {} | {:.2} | {:.3} | {} of {} | {:.1} | {:.0} |",
+        "| {kind} | {} | {} | {:.3} | {:.3} | {:.2} | {:.2} | {:.3} | {:.3} | {:.3} | {} | {:.2} | {:.3} | {} of {} | {:.3} | {:.3} | {:.1} | {:.0} |",
         trials.len(),
         trials.iter().filter(|trial| trial.is_complete()).count(),
         mean(&|trial| trial.recall),
@@ -291,10 +334,13 @@ fn print_summary(kind: RoomKind, trials: &[Trial]) {
         mean(&|trial| trial.held),
         mean(&|trial| trial.true_held),
         trials.iter().filter(|trial| trial.lead_nats > -SEARCH_NATS).count(),
-        trials.iter().map(|trial| trial.wrong_observed_m).sum::<f64>(),
+        // Without the sign of a zero.
+        trials.iter().map(|trial| trial.wrong_observed_m).sum::<f64>().max(0.0) + 0.0,
         mean(&|trial| trial.outer_recall),
         trials.iter().map(|trial| trial.faces[1]).sum::<usize>(),
         trials.iter().map(|trial| trial.faces[0]).sum::<usize>(),
+        intervals(0),
+        intervals(1),
         mean(&|trial| trial.seconds),
         mean(&|trial| trial.scenes as f64),
     );
