@@ -342,10 +342,7 @@ impl<'a> SurveySearch<'a> {
         let last = &ROUNDS[ROUNDS.len() - 1];
         for is_last in [false, false, true] {
             let judge = Judge::new(self.workspace, &self.posed.poses, last.sigma_m);
-            let poses = polish(&mut self.posed, &judge);
-            if let (Some(known), Some(poses)) = (self.covariance.take(), poses) {
-                self.covariance = Some(known.with_poses(poses));
-            }
+            polish(&mut self.posed, &judge);
             let judge = Judge::new(self.workspace, &self.posed.poses, last.sigma_m);
             let mut assessment = assess(&self.posed, &judge);
             match assessment.better.take().filter(|_| !is_last) {
