@@ -3,6 +3,7 @@
 use std::{
     collections::HashMap,
     f64::consts::TAU,
+    hash::{DefaultHasher, Hash, Hasher},
     sync::{Arc, Mutex, PoisonError},
 };
 
@@ -16,7 +17,6 @@ use sonard_model::{
 use crate::{
     arrangement::{JOINED_M, LineArrangement, PieceSet, Segment},
     readings::{Outcome, Readings},
-    scores::plan_digest,
     workspace::Workspace,
 };
 
@@ -140,6 +140,18 @@ impl<'a> Judge<'a> {
             self.readings().iter().zip(&self.poses).map(of_sweep).collect();
         all.map(|all| (simulator, all))
     }
+}
+
+/// Digest of walls, poses and standard deviation of ranges in metres.
+fn plan_digest(segments: &[Segment], poses: &[Pose], sigma_m: f64) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    segments.len().hash(&mut hasher);
+    let ends = segments.iter().flat_map(|wall| [wall.a.to_array(), wall.b.to_array()]);
+    let poses = poses.iter().flat_map(|pose| [pose.x_m, pose.y_m, pose.heading_deg]);
+    for value in ends.flatten().chain(poses).chain([sigma_m]) {
+        value.to_bits().hash(&mut hasher);
+    }
+    hasher.finish()
 }
 
 /// Scene with walls of the first material of a template; walls keep their index.

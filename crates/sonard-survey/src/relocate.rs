@@ -1,4 +1,4 @@
-//! Sweeps whose poses the course got wrong, located anew in the plan of the others.
+//! Sweeps whose poses the course got wrong, located in the plan of the others.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use crate::{
     trace::unexplained,
 };
 
-/// Share of its arcs unexplained from which a sweep is located anew.
+/// Share of its arcs unexplained from which a sweep is lost.
 const LOST_SHARE: f64 = 0.5;
 /// Minimum gain of another pose, nats.
 const MIN_GAIN: f64 = 10.0;

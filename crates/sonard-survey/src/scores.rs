@@ -2,13 +2,8 @@
 
 use std::{
     collections::BTreeMap,
-    hash::{DefaultHasher, Hash, Hasher},
     sync::{Mutex, PoisonError},
 };
-
-use sonard_model::geometry::Pose;
-
-use crate::arrangement::Segment;
 
 /// Log-likelihoods of plans that a search has scored, by a digest of walls, poses and errors.
 ///
@@ -45,16 +40,4 @@ impl FromIterator<(u64, f64)> for PlanScores {
     fn from_iter<I: IntoIterator<Item = (u64, f64)>>(entries: I) -> Self {
         Self { known: Mutex::new(entries.into_iter().collect()) }
     }
-}
-
-/// Digest of walls, poses and standard deviation of ranges in metres.
-pub(crate) fn plan_digest(segments: &[Segment], poses: &[Pose], sigma_m: f64) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    segments.len().hash(&mut hasher);
-    let ends = segments.iter().flat_map(|wall| [wall.a.to_array(), wall.b.to_array()]);
-    let poses = poses.iter().flat_map(|pose| [pose.x_m, pose.y_m, pose.heading_deg]);
-    for value in ends.flatten().chain(poses).chain([sigma_m]) {
-        value.to_bits().hash(&mut hasher);
-    }
-    hasher.finish()
 }

@@ -78,7 +78,7 @@ fn suggested<'a>(arc: &'a Arc, pose: &Pose) -> [SupportedFeature<'a>; 2] {
     VirtualFeature::of_arc(arc, pose).map(|feature| SupportedFeature { feature, arcs: vec![arc] })
 }
 
-/// Assigns all arcs to features anew, for changed poses.
+/// Assigns all arcs to features for changed poses.
 pub(crate) fn reassociated<'a>(
     features: &[SupportedFeature<'a>],
     arcs: &'a [Vec<Arc>],
