@@ -28,6 +28,7 @@ mod completions;
 #[cfg(feature = "daemon")]
 mod daemon;
 mod diagnostic;
+mod digest;
 #[cfg(feature = "daemon")]
 mod doctor;
 mod export;

@@ -1,5 +1,6 @@
 //! `sonard survey`.
 
+mod checkpoint;
 mod files;
 mod picture;
 mod summary;
@@ -24,8 +25,8 @@ use crate::{
     scan::{Provenance, Session, text::format_count},
     scene::Scene,
     survey::{
-        OdometrySigma, SearchEnd, Survey, SurveyError, SurveyObserver, SurveyOptions,
-        SurveyProgress, SurveyStage, survey,
+        OdometrySigma, PlanScores, SearchEnd, Survey, SurveyError, SurveyObserver, SurveyOptions,
+        SurveyProgress, SurveyStage, resume_survey,
     },
 };
 
@@ -79,12 +80,13 @@ echoes of any order locate the sweeps, with odometry as prior. Walls are then pl
 through these features such that the model explains the readings best: echoes along any path, \
 missing echoes, minimum ranges. No scene is needed; one in the log is ignored.
 
-Each stretch of wall is observed (the path of an explained echo is reflected there), implied \
+Each stretch of wall is observed (explained echoes of two sweeps or more determine it there), implied \
 (plans without it explain less) or conjectured (left out of scene.json without --closed). Floor \
 plans that explain the readings nearly as well are listed with their probabilities. The frame is \
 the pose of the first sweep in the log. Dimensions follow the speed of sound: 0.17 % per degree.
 
-An interrupted survey writes the best plan so far.";
+An interrupted survey, or one whose budget is spent, writes the best plan so far and \
+unfinished.jsonl, from which the same command continues; --max-scenes may differ.";
 
 const HELP: &str = "\
 Files in DIR: scene.json with the stops as poses; poses.csv; survey.json with covariances, status, \
@@ -108,11 +110,22 @@ struct Input {
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
-    files::check(&args.out, args.overwrite)?;
     let what_if = args.instead.load()?;
     let input = read(args, &what_if)?;
-    let found = find(args, &input)?;
-    files::write(args, &input, &found)?;
+    let head = checkpoint::Head::new(args, &input);
+    let saved = checkpoint::load(&args.out, args.overwrite, &head)?;
+    // The results beside a checkpoint are those of the same survey.
+    let overwrite = args.overwrite.or_forced(saved.is_some());
+    files::check(&args.out, overwrite)?;
+    let scores = saved.unwrap_or_default();
+    let found = find(args, &input, &scores)?;
+    files::write(args, overwrite, &input, &found)?;
+    match found.end {
+        SearchEnd::Complete | SearchEnd::UnexplainedArcs => checkpoint::remove(&args.out)?,
+        SearchEnd::Budget | SearchEnd::Cancelled => {
+            checkpoint::save(&args.out, overwrite, &head, &scores)?;
+        }
+    }
     print_result(args.json, [&found], |out| summary::print(out, &input, &found))?;
     match found.end {
         SearchEnd::Complete | SearchEnd::UnexplainedArcs => Ok(()),
@@ -210,7 +223,7 @@ fn unknown_room() -> Result<Arc<Scene>, Failure> {
 }
 
 /// Surveys until done or interrupted.
-fn find(args: &Args, input: &Input) -> Result<Survey, Failure> {
+fn find(args: &Args, input: &Input, scores: &PlanScores) -> Result<Survey, Failure> {
     let runtime = runtime::new()?;
     let interrupts = {
         let _within = runtime.enter();
@@ -219,7 +232,7 @@ fn find(args: &Args, input: &Input) -> Result<Survey, Failure> {
     let sweeps = format_count(input.sweeps.len(), "sweep");
     let bar = progress::spinner(&format!("survey of {sweeps}:"));
     let observer = Observer { bar: bar.clone(), interrupts };
-    let found = survey(&input.world, &input.sweeps, &args.options(), &observer);
+    let found = resume_survey(&input.world, &input.sweeps, &args.options(), scores, &observer);
     bar.finish_and_clear();
     found.map_err(|error| failure_from(&error))
 }

@@ -100,6 +100,13 @@ fn survey_reconstructs_room_and_course() {
     assert!(read("report.md").contains("![Floor plan](plan.png)"));
     assert!(read("plan.svg").contains("observed wall"));
 
+    // Without odometry, the room looks alike from two poses half a turn apart.
+    let blind = path(folder.path(), "blind");
+    let mut without = vec!["survey", "--no-odometry", "--out", &blind, "--max-range", "4"];
+    without.extend(logs.iter().map(String::as_str));
+    let printed = succeeds(&without);
+    assert!(printed.contains("3 sweeps explained as well by other poses"), "{printed}");
+
     // The scene is one for other verbs, in which readings agree and are found again.
     let scene = path(Path::new(&out), "scene.json");
     succeeds(&["scene", "check", &scene]);
@@ -129,10 +136,13 @@ fn survey_states_what_is_missing() {
     let folder = tempfile::tempdir().expect("a folder");
     let logs = sweeps(folder.path());
     let out = path(folder.path(), "out");
-    let rejected = |arguments: &[&str], reason: &str| {
-        let output = run(&[&["survey", "--out", &out], arguments].concat());
+    let rejected_at = |out: &str, arguments: &[&str], reason: &str| {
+        let output = run(&[&["survey", "--out", out], arguments].concat());
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");
         assert!(stderr(&output).contains(reason), "{arguments:?}: {}", stderr(&output));
+    };
+    let rejected = |arguments: &[&str], reason: &str| {
+        rejected_at(&out, arguments, reason);
         assert!(!Path::new(&out).exists());
     };
     rejected(&[&logs[0]], "a survey needs at least 2");
@@ -146,4 +156,16 @@ fn survey_states_what_is_missing() {
     let printed = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(printed.contains("the budget is spent before the search ended"), "{printed}");
     assert!(Path::new(&out).join("scene.json").exists());
+    // The same command continues from there, with the result of an uninterrupted survey.
+    let unfinished = Path::new(&out).join("unfinished.jsonl");
+    assert!(unfinished.exists());
+    rejected_at(&out, &[&logs[0], &logs[2]], "it belongs to another survey");
+    let whole = path(folder.path(), "whole");
+    for out in [&out, &whole] {
+        succeeds(&["survey", &logs[0], &logs[1], "--out", out, "--max-scenes", "5000"]);
+    }
+    let [resumed, whole] = [&out, &whole]
+        .map(|out| fs::read_to_string(Path::new(out).join("survey.json")).expect("a survey"));
+    assert_eq!(resumed, whole);
+    assert!(!unfinished.exists());
 }

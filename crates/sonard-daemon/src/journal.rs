@@ -305,9 +305,7 @@ impl JournalWriter {
     fn run(mut self, incoming: &Receiver<JournalEntry>) -> LogStatus {
         loop {
             let entry = incoming.recv_timeout(self.timeout());
-            if entry.is_ok() {
-                self.progress.queued.fetch_sub(1, Ordering::Relaxed);
-            }
+            let received = usize::from(entry.is_ok());
             match entry {
                 Ok(JournalEntry::Record(record)) => self.waiting.push_back(record),
                 Ok(JournalEntry::Rotation(rotation)) => self.log.set_rotation(rotation),
@@ -320,6 +318,8 @@ impl JournalWriter {
             if self.retry_at.is_none_or(|at| at <= Instant::now()) {
                 self.write();
             }
+            // Counted until it is written or among the waiting ones.
+            self.progress.queued.fetch_sub(received, Ordering::Relaxed);
         }
     }
 

@@ -8,7 +8,7 @@ use crate::{
     posed::PosedPlan,
     result::{PieceStatus, WallPiece},
     search::{PlanSearch, ScoredPlan},
-    trace::touched_pieces,
+    spots::observed_stretches,
 };
 
 /// Maximum difference of the score of a listed alternative, nats.
@@ -42,10 +42,9 @@ pub(crate) struct Assessment {
 pub(crate) fn assess(posed: &PosedPlan, judge: &Judge) -> Assessment {
     let plan = &posed.plan;
     let best = ScoredPlan { walls: posed.walls.clone(), score: judge.score(plan, &posed.walls) };
-    let touched = touched_pieces(plan, &best.walls, judge);
-    let touched = touched.unwrap_or_else(|| PieceSet::new(plan.pieces()));
+    let observed = observed_stretches(plan, &best.walls, judge);
     let mut assessment = Assessment { walls: Vec::new(), alternatives: Vec::new(), better: None };
-    for run in plan.runs(&best.walls) {
+    for (run, observed) in plan.runs(&best.walls).into_iter().zip(observed) {
         let off: Vec<(usize, bool)> =
             (run.first..=run.last).map(|at| (plan.piece(run.line, at), false)).collect();
         let without = best.walls.changed(&off);
@@ -56,8 +55,11 @@ pub(crate) fn assess(posed: &PosedPlan, judge: &Judge) -> Assessment {
         if let Some(other) = other {
             assessment.add(plan, &best, &other);
         }
-        let is_needed = lead_nats.min(evidence_nats) > IMPLIED_NATS;
-        let pieces = pieces(plan, judge, &best, &run, &touched, is_needed);
+        let lead_nats = lead_nats.min(evidence_nats);
+        // A wall that a listed alternative lacks is not observed.
+        let observed = if lead_nats > LISTED_NATS { observed } else { Vec::new() };
+        let is_needed = lead_nats > IMPLIED_NATS;
+        let pieces = pieces(plan, judge, &best, &run, &observed, is_needed);
         let segment = plan.segment(&run);
         assessment.walls.push(JudgedWall { run, segment, evidence_nats, pieces });
     }
@@ -102,37 +104,57 @@ fn best_without(
     search.trim(found)
 }
 
-/// Pieces of a wall by status, neighbours of one status joined.
+/// Stretches of a wall by status, neighbours of one status joined.
 fn pieces(
     plan: &LineArrangement,
     judge: &Judge,
     best: &ScoredPlan,
     run: &Run,
-    touched: &PieceSet,
+    observed: &[[f64; 2]],
     is_needed: bool,
 ) -> Vec<WallPiece> {
-    let status = |at: usize| {
-        let piece = plan.piece(run.line, at);
-        if touched.contains(piece) && is_needed {
-            return PieceStatus::Observed;
-        }
-        let without = judge.score(plan, &best.walls.changed(&[(piece, false)]));
-        if is_needed && best.score - without > IMPLIED_NATS {
-            PieceStatus::Implied
-        } else {
-            PieceStatus::Conjectured
-        }
-    };
+    let line = &plan.lines[run.line];
     let mut found: Vec<WallPiece> = Vec::new();
     for at in run.first..=run.last {
-        let [from_m, to_m] = plan.ends_of(run.line, at).map(|end| end.to_array());
-        let status = status(at);
-        match found.last_mut().filter(|last| last.status == status) {
-            Some(last) => last.to_m = to_m,
-            None => found.push(WallPiece { from_m, to_m, status }),
+        let piece = plan.piece(run.line, at);
+        let is_implied = || {
+            let without = judge.score(plan, &best.walls.changed(&[(piece, false)]));
+            is_needed && best.score - without > IMPLIED_NATS
+        };
+        let [from_m, to_m] = [at, at + 1].map(|cut| plan.cuts[run.line][cut].along_m);
+        for (range_m, is_observed) in split([from_m, to_m], observed) {
+            let status = if is_observed {
+                PieceStatus::Observed
+            } else if is_implied() {
+                PieceStatus::Implied
+            } else {
+                PieceStatus::Conjectured
+            };
+            let [from_m, to_m] = range_m.map(|along_m| line.at(along_m).to_array());
+            match found.last_mut().filter(|last| last.status == status) {
+                Some(last) => last.to_m = to_m,
+                None => found.push(WallPiece { from_m, to_m, status }),
+            }
         }
     }
     found
+}
+
+/// Parts of a range inside and outside of ordered stretches, `true` inside.
+fn split([from, to]: [f64; 2], stretches: &[[f64; 2]]) -> Vec<([f64; 2], bool)> {
+    let mut parts = Vec::new();
+    let mut at = from;
+    for stretch in stretches {
+        let [low, high] = stretch.map(|end| end.clamp(at, to));
+        if low < high {
+            parts.push(([at, low], false));
+            parts.push(([low, high], true));
+            at = high;
+        }
+    }
+    parts.push(([at, to], false));
+    parts.retain(|([low, high], _)| low < high);
+    parts
 }
 
 /// Returns `true` if all points of each plan are near the other.

@@ -5,7 +5,8 @@ use sonard_inverse::{FitSweep, World};
 
 use crate::{
     error::SurveyError, feature::VirtualFeature, normal::pose_column, options::SurveyOptions,
-    progress::NoObserver, result::SurveyedPose, slam::virtual_map, survey::workspace,
+    progress::NoObserver, result::SurveyedPose, scores::PlanScores, slam::virtual_map,
+    survey::workspace,
 };
 
 /// Poses and virtual features of a course.
@@ -29,7 +30,8 @@ pub fn map_course(
     sweeps: &[FitSweep],
     options: &SurveyOptions,
 ) -> Result<CourseMap, SurveyError> {
-    let workspace = workspace(world, sweeps, options, &NoObserver)?;
+    let scores = PlanScores::default();
+    let workspace = workspace(world, sweeps, options, (&NoObserver, &scores))?;
     let map = virtual_map(&workspace.arcs, workspace.readings[0].odometry, &workspace.moves);
     let sigma = |at: usize| match (pose_column(at), &map.covariance) {
         (None, _) => Some([0.0; 3]),
@@ -45,6 +47,7 @@ pub fn map_course(
             pose: *pose,
             sigma_m: sigma.map(|[x, y, _]| [x, y]),
             sigma_heading_deg: sigma.map(|[.., heading_rad]| heading_rad.to_degrees()),
+            equivalent: Vec::new(),
         }
     });
     let features = map.features.iter().map(|of| (of.feature, of.arcs.len()));

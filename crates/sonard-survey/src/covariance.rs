@@ -9,27 +9,18 @@ use crate::{arrangement::LineArrangement, normal::pose_column, posed::LineColumn
 #[derive(Debug, Clone)]
 pub(crate) struct PlanCovariance {
     matrix: DMatrix<f64>,
-    /// Covariance of the poses by all readings, if known.
-    poses: Option<DMatrix<f64>>,
     columns: LineColumns,
 }
 
 impl PlanCovariance {
     pub(crate) const fn new(matrix: DMatrix<f64>, columns: LineColumns) -> Self {
-        Self { matrix, poses: None, columns }
-    }
-
-    /// Covariance with that of the poses from another estimate of the same columns.
-    pub(crate) fn with_poses(mut self, poses: DMatrix<f64>) -> Self {
-        self.poses = Some(poses);
-        self
+        Self { matrix, columns }
     }
 
     /// Standard deviations of a pose: x, y in metres and heading in degrees; 0 for the first.
     pub(crate) fn pose_sigma(&self, pose: usize) -> [f64; 3] {
         let Some(at) = pose_column(pose) else { return [0.0; 3] };
-        let matrix = self.poses.as_ref().unwrap_or(&self.matrix);
-        let sigma = |at: usize| matrix[(at, at)].max(0.0).sqrt();
+        let sigma = |at: usize| self.matrix[(at, at)].max(0.0).sqrt();
         [sigma(at), sigma(at + 1), sigma(at + 2).to_degrees()]
     }
 

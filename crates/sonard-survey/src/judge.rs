@@ -3,6 +3,7 @@
 use std::{
     collections::HashMap,
     f64::consts::TAU,
+    hash::{DefaultHasher, Hash, Hasher},
     sync::{Arc, Mutex, PoisonError},
 };
 
@@ -83,13 +84,25 @@ impl<'a> Judge<'a> {
     /// Log-likelihood of all readings, with the readings of an arc as one, nats.
     pub(crate) fn log_likelihood(&self, segments: &[Segment]) -> f64 {
         self.workspace.count();
-        let Some(simulator) = self.simulator_of(segments) else { return UNSCORED };
-        let of_sweep = |(readings, pose): (&Readings, &Pose)| {
-            let predicted = predict(&simulator, readings, pose)?;
-            Some(self.of_sweep(readings, &predicted))
+        let sum = || {
+            let simulator = self.simulator_of(segments)?;
+            let of_sweep = |(sweep, pose)| self.log_likelihood_of(&simulator, sweep, pose);
+            self.poses.iter().enumerate().map(of_sweep).sum::<Option<f64>>()
         };
-        let sum: Option<f64> = self.readings().iter().zip(&self.poses).map(of_sweep).sum();
-        sum.unwrap_or(UNSCORED)
+        let plan = plan_digest(segments, &self.poses, self.sigma_m);
+        self.workspace.scores.get_or(plan, || sum().unwrap_or(UNSCORED))
+    }
+
+    /// Log-likelihood of the readings of one sweep from a pose, nats; `None` if the scene has more
+    /// paths than the model follows.
+    pub(crate) fn log_likelihood_of(
+        &self,
+        simulator: &Simulator,
+        sweep: usize,
+        pose: &Pose,
+    ) -> Option<f64> {
+        let readings = &self.readings()[sweep];
+        Some(self.of_sweep(readings, &predict(simulator, readings, pose)?))
     }
 
     fn of_sweep(&self, readings: &Readings, predicted: &[Prediction]) -> f64 {
@@ -127,6 +140,18 @@ impl<'a> Judge<'a> {
             self.readings().iter().zip(&self.poses).map(of_sweep).collect();
         all.map(|all| (simulator, all))
     }
+}
+
+/// Digest of walls, poses and standard deviation of ranges in metres.
+fn plan_digest(segments: &[Segment], poses: &[Pose], sigma_m: f64) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    segments.len().hash(&mut hasher);
+    let ends = segments.iter().flat_map(|wall| [wall.a.to_array(), wall.b.to_array()]);
+    let poses = poses.iter().flat_map(|pose| [pose.x_m, pose.y_m, pose.heading_deg]);
+    for value in ends.flatten().chain(poses).chain([sigma_m]) {
+        value.to_bits().hash(&mut hasher);
+    }
+    hasher.finish()
 }
 
 /// Scene with walls of the first material of a template; walls keep their index.

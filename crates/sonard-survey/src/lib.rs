@@ -33,12 +33,16 @@ mod posed;
 mod progress;
 mod readings;
 mod refine;
+mod relocate;
 mod report;
 mod result;
 mod rows;
+mod scores;
 mod search;
 mod slam;
+mod spots;
 mod survey;
+mod symmetry;
 #[cfg(test)]
 mod tests;
 mod trace;
@@ -54,4 +58,5 @@ pub use result::{
     AlternativePlan, PieceStatus, ReadingCause, SearchEnd, Survey, SurveyedEnd, SurveyedPose,
     SurveyedWall, UnexplainedArc, WallPiece,
 };
-pub use survey::{score_plan, survey};
+pub use scores::PlanScores;
+pub use survey::{resume_survey, score_plan, survey};

@@ -1,4 +1,4 @@
-//! Final estimate of poses and walls by the exact likelihood of all readings, with its covariance.
+//! Final estimate of poses and walls by the exact likelihood of all readings.
 
 use std::sync::Arc;
 
@@ -29,9 +29,9 @@ struct Linearized {
 }
 
 /// Improves poses and the distances of lines by the likelihood of all readings: ranges, missing
-/// echoes and the ends of arcs. Directions of lines remain. Returns the covariance of the poses and
-/// distances for these directions.
-pub(crate) fn polish(posed: &mut PosedPlan, judge: &Judge) -> Option<DMatrix<f64>> {
+/// echoes and the ends of arcs. Directions of lines remain. Returns `None` if the normal equations
+/// have no solution.
+pub(crate) fn polish(posed: &mut PosedPlan, judge: &Judge) -> Option<()> {
     let errors = error_model(posed, judge)?;
     let mut best = linearize(posed, judge, &errors)?;
     let mut damping = 1e-3;
@@ -49,7 +49,7 @@ pub(crate) fn polish(posed: &mut PosedPlan, judge: &Judge) -> Option<DMatrix<f64
             break;
         }
     }
-    best.normal.covariance()
+    Some(())
 }
 
 /// Error model with the observed scatter of ranges.

@@ -15,6 +15,7 @@ use crate::{
         AlternativePlan, ReadingCause, SearchEnd, Survey, SurveyedEnd, SurveyedPose, SurveyedWall,
         UnexplainedArc,
     },
+    symmetry::equivalent_poses,
     trace::unexplained,
     workspace::Workspace,
 };
@@ -39,6 +40,7 @@ pub(crate) fn report(
         readings.beams.iter().zip(predictions).map(|(beam, of)| cause(beam, of)).collect()
     });
     let covariance = covariance.as_ref();
+    let equivalent = equivalent_poses(posed, &judge);
     let (alternatives, probability) = weighted(assessment);
     Survey {
         walls: assessment
@@ -49,14 +51,16 @@ pub(crate) fn report(
             .collect(),
         poses: sweeps
             .iter()
+            .zip(equivalent)
             .enumerate()
-            .map(|(at, sweep)| {
+            .map(|(at, (sweep, equivalent))| {
                 let sigma = covariance.map(|covariance| covariance.pose_sigma(at));
                 SurveyedPose {
                     scan: sweep.scan,
                     pose: posed.poses[at],
                     sigma_m: sigma.map(|[x, y, _]| [x, y]),
                     sigma_heading_deg: sigma.map(|[.., heading]| heading),
+                    equivalent,
                 }
             })
             .collect(),

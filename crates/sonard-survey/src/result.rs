@@ -78,16 +78,17 @@ pub struct WallPiece {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PieceStatus {
-    /// The path of an explained arc is reflected there, and plans without the wall score worse.
+    /// Inside the Fresnel zone of a mirror reflection by which an arc is explained, on a wall that
+    /// echoes from two sweeps or more determine and no listed alternative lacks.
     Observed,
-    /// No path is reflected there, but the plan without the stretch scores more than 3 nats worse.
+    /// Outside of such zones, but the plan without the stretch scores more than 3 nats worse.
     Implied,
     /// The readings hardly depend on it.
     Conjectured,
 }
 
 /// Pose of a sweep.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SurveyedPose {
     /// Scan of the sweep.
     pub scan: Uuid,
@@ -97,6 +98,9 @@ pub struct SurveyedPose {
     pub sigma_m: Option<[f64; 2]>,
     /// Standard deviation of the heading, degrees.
     pub sigma_heading_deg: Option<f64>,
+    /// Other poses that explain the sweep as well, within 10 nats, because the room looks alike
+    /// from them.
+    pub equivalent: Vec<Pose>,
 }
 
 /// Arc that the plan does not explain.

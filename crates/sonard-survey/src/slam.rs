@@ -78,6 +78,16 @@ fn suggested<'a>(arc: &'a Arc, pose: &Pose) -> [SupportedFeature<'a>; 2] {
     VirtualFeature::of_arc(arc, pose).map(|feature| SupportedFeature { feature, arcs: vec![arc] })
 }
 
+/// Assigns all arcs to features for changed poses.
+pub(crate) fn reassociated<'a>(
+    features: &[SupportedFeature<'a>],
+    arcs: &'a [Vec<Arc>],
+    poses: &[Pose],
+) -> Vec<SupportedFeature<'a>> {
+    let all: Vec<&Arc> = arcs.iter().flatten().collect();
+    owned(&mut associate(features, &all, poses, GATE_M[1]), poses)
+}
+
 /// Assigns each arc to the best feature of each kind, and begins new features with the others.
 fn associate<'a>(
     features: &[SupportedFeature<'a>],

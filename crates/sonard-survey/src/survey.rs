@@ -24,10 +24,12 @@ use crate::{
     progress::{NoObserver, SurveyObserver, SurveyProgress, SurveyStage},
     readings::Readings,
     refine::{RefineSettings, refine},
+    relocate::relocated,
     report::report,
     result::{SearchEnd, Survey},
+    scores::PlanScores,
     search::{PlanSearch, initial_walls},
-    slam::virtual_map,
+    slam::{reassociated, virtual_map},
     trace::unexplained,
     workspace::Workspace,
 };
@@ -73,7 +75,22 @@ pub fn survey(
     options: &SurveyOptions,
     observer: &dyn SurveyObserver,
 ) -> Result<Survey, SurveyError> {
-    let workspace = workspace(world, sweeps, options, observer)?;
+    resume_survey(world, sweeps, options, &PlanScores::default(), observer)
+}
+
+/// Reconstructs a room as [`survey`], with the scores of a search that ended early, which are
+/// extended.
+///
+/// # Errors
+/// As [`survey`].
+pub fn resume_survey(
+    world: &World,
+    sweeps: &[FitSweep],
+    options: &SurveyOptions,
+    scores: &PlanScores,
+    observer: &dyn SurveyObserver,
+) -> Result<Survey, SurveyError> {
+    let workspace = workspace(world, sweeps, options, (observer, scores))?;
     workspace.limit_scenes((SEARCH_SHARE * options.max_scenes as f64) as usize);
     let mut search = SurveySearch::new(&workspace, options);
     search.run();
@@ -95,7 +112,8 @@ pub fn score_plan(
     walls: &[[DVec2; 2]],
     poses: &[Pose],
 ) -> Result<f64, SurveyError> {
-    let workspace = workspace(world, sweeps, options, &NoObserver)?;
+    let scores = PlanScores::default();
+    let workspace = workspace(world, sweeps, options, (&NoObserver, &scores))?;
     let judge = Judge::new(&workspace, poses, FINAL_SIGMA_M);
     let segment = |(line, &[a, b]): (usize, &[DVec2; 2])| Segment { line, a, b };
     Ok(judge.score_segments(&walls.iter().enumerate().map(segment).collect::<Vec<_>>()))
@@ -105,7 +123,7 @@ pub(crate) fn workspace<'a>(
     world: &World,
     sweeps: &'a [FitSweep],
     options: &SurveyOptions,
-    observer: &'a dyn SurveyObserver,
+    watched: (&'a dyn SurveyObserver, &'a PlanScores),
 ) -> Result<Workspace<'a>, SurveyError> {
     if sweeps.len() < 2 {
         return Err(SurveyError::TooFewSweeps(sweeps.len()));
@@ -119,7 +137,7 @@ pub(crate) fn workspace<'a>(
     let poses: Vec<Pose> = sweeps.iter().map(|sweep| sweep.pose).collect();
     let between = |sigma| Move::between(&poses, sigma);
     let moves = options.odometry.map_or_else(Vec::new, between);
-    let workspace = Workspace::new((world.clone(), simulator), sweeps, readings, moves, observer);
+    let workspace = Workspace::new((world.clone(), simulator), sweeps, readings, moves, watched);
     let without = workspace.arcs.iter().zip(sweeps).find(|(arcs, _)| arcs.is_empty());
     match without {
         Some((_, sweep)) => Err(SurveyError::NoArcs(sweep.scan)),
@@ -168,15 +186,43 @@ impl<'a> SurveySearch<'a> {
     /// Runs the rounds; where arcs remain unexplained, begins again from the long walls alone.
     fn run(&mut self) {
         self.rounds(0);
+        self.find_lost_sweeps();
         for _ in 0..MAX_RESTARTS {
             if self.workspace.is_over() || self.left().is_empty() && !self.has_short_walls() {
                 break;
             }
-            let before = (self.posed.clone(), self.covariance.clone(), self.score);
+            let before = self.state();
             self.drop_short_walls();
             self.rounds(1);
             if self.score < before.2 {
-                (self.posed, self.covariance, self.score) = before;
+                self.restore(before);
+                break;
+            }
+        }
+    }
+
+    fn state(&self) -> (PosedPlan, Option<PlanCovariance>, Option<f64>) {
+        (self.posed.clone(), self.covariance.clone(), self.score)
+    }
+
+    fn restore(&mut self, state: (PosedPlan, Option<PlanCovariance>, Option<f64>)) {
+        (self.posed, self.covariance, self.score) = state;
+    }
+
+    /// Locates sweeps whose poses the course got wrong in the plan of the others, and begins again
+    /// from its long walls.
+    fn find_lost_sweeps(&mut self) {
+        for _ in 0..MAX_RESTARTS {
+            let judge = Judge::new(self.workspace, &self.posed.poses, FINAL_SIGMA_M);
+            let moved = (!self.workspace.is_over()).then(|| relocated(&self.posed, &judge));
+            let Some(poses) = moved.flatten() else { break };
+            let before = self.state();
+            self.features = reassociated(&self.features, &self.workspace.arcs, &poses);
+            self.posed.poses = poses;
+            self.drop_short_walls();
+            self.rounds(1);
+            if self.score < before.2 {
+                self.restore(before);
                 break;
             }
         }
@@ -296,10 +342,7 @@ impl<'a> SurveySearch<'a> {
         let last = &ROUNDS[ROUNDS.len() - 1];
         for is_last in [false, false, true] {
             let judge = Judge::new(self.workspace, &self.posed.poses, last.sigma_m);
-            let poses = polish(&mut self.posed, &judge);
-            if let (Some(known), Some(poses)) = (self.covariance.take(), poses) {
-                self.covariance = Some(known.with_poses(poses));
-            }
+            polish(&mut self.posed, &judge);
             let judge = Judge::new(self.workspace, &self.posed.poses, last.sigma_m);
             let mut assessment = assess(&self.posed, &judge);
             match assessment.better.take().filter(|_| !is_last) {

@@ -22,6 +22,7 @@ use crate::{
     odometry::OdometrySigma,
     options::SurveyOptions,
     progress::SurveyObserver,
+    scores::PlanScores,
     survey::workspace,
     workspace::Workspace,
 };
@@ -100,9 +101,9 @@ fn options() -> SurveyOptions {
 fn true_workspace<'a>(
     world: &World,
     sweeps: &'a [FitSweep],
-    observer: &'a dyn SurveyObserver,
+    watched: (&'a dyn SurveyObserver, &'a PlanScores),
 ) -> Workspace<'a> {
-    workspace(world, sweeps, &options(), observer).expect("sweeps with arcs")
+    workspace(world, sweeps, &options(), watched).expect("sweeps with arcs")
 }
 
 /// Arrangement of the lines through pairs of points, with the pieces between the points as walls.

@@ -10,6 +10,7 @@ use crate::{
     odometry::Move,
     progress::SurveyObserver,
     readings::Readings,
+    scores::PlanScores,
 };
 
 /// Inputs of a survey with its budget.
@@ -25,6 +26,7 @@ pub(crate) struct Workspace<'a> {
     /// Odometry between consecutive sweeps; empty without odometry.
     pub(crate) moves: Vec<Move>,
     pub(crate) observer: &'a dyn SurveyObserver,
+    pub(crate) scores: &'a PlanScores,
     scored: AtomicUsize,
     limit: AtomicUsize,
 }
@@ -35,17 +37,23 @@ impl<'a> Workspace<'a> {
         sweeps: &'a [FitSweep],
         readings: Vec<Readings>,
         moves: Vec<Move>,
-        observer: &'a dyn SurveyObserver,
+        (observer, scores): (&'a dyn SurveyObserver, &'a PlanScores),
     ) -> Self {
         let numbered = readings.iter().enumerate();
         let arcs = numbered.map(|(sweep, readings)| find_arcs(sweep, readings)).collect();
         let limit = AtomicUsize::new(usize::MAX);
-        Self { world, sweeps, simulator, readings, arcs, moves, observer, scored: 0.into(), limit }
+        let scored = AtomicUsize::new(0);
+        Self { world, sweeps, simulator, readings, arcs, moves, observer, scores, scored, limit }
     }
 
     /// Maximum range of the ranger, metres: the region around the poses with walls.
     pub(crate) fn reach_m(&self) -> f64 {
         self.simulator.receiver().max_range_m
+    }
+
+    /// Wavelength of the ranger, metres.
+    pub(crate) fn wavelength_m(&self) -> f64 {
+        self.world.air.sound_speed_m_s() / self.world.sensor.frequency_hz
     }
 
     /// Counts a scored scene.

@@ -5,7 +5,6 @@
 //! command resumes.
 
 use std::{
-    fmt::{self, Write as _},
     fs::{self, File, OpenOptions, TryLockError},
     io::{self, Read as _, Write as _},
     path::{Path, PathBuf},
@@ -13,15 +12,15 @@ use std::{
 };
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest as _, Sha256};
 
 use crate::{
     cli::{
         Failure, Outcome,
+        digest::digest,
         output::{Overwrite, Product, make_folder},
     },
     inverse::{FitOptions, FitSweep, SearchResult, World},
-    store::{open_no_follow, to_hex},
+    store::open_no_follow,
 };
 
 /// File name in the output folder.
@@ -48,22 +47,8 @@ pub(super) struct Head {
 impl Head {
     /// Digest of a fit's readings, scene, sensor, air, model and priors.
     pub(super) fn new(world: &World, sweeps: &[FitSweep], fit: &FitOptions) -> Self {
-        let mut digest = DigestWriter(Sha256::new());
-        // `Debug` covers all fields, including future ones, and prints floats with round-trip
-        // precision.
-        let _ = write!(digest, "{world:?} {sweeps:?} {fit:?}");
-        let calibration_sha256 = to_hex(&digest.0.finalize());
+        let calibration_sha256 = digest(format_args!("{world:?} {sweeps:?} {fit:?}"));
         Self { calibration_sha256, version: env!("CARGO_PKG_VERSION").to_owned() }
-    }
-}
-
-/// Digest of written text.
-struct DigestWriter(Sha256);
-
-impl fmt::Write for DigestWriter {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        self.0.update(text);
-        Ok(())
     }
 }
 

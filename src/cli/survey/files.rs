@@ -29,7 +29,7 @@ pub(super) fn check(folder: &Path, overwrite: Overwrite) -> Outcome {
 /// # Errors
 ///
 /// Write errors, or a plan that is no valid scene.
-pub(super) fn write(args: &Args, input: &Input, found: &Survey) -> Outcome {
+pub(super) fn write(args: &Args, overwrite: Overwrite, input: &Input, found: &Survey) -> Outcome {
     make_folder(&args.out)?;
     let scene = found.scene("survey", args.closed);
     scene.build().map_err(|error| {
@@ -38,9 +38,9 @@ pub(super) fn write(args: &Args, input: &Input, found: &Survey) -> Outcome {
     let json = serde_json::to_string_pretty(found).unwrap_or_default() + "\n";
     let contents = [scene.text(), poses(found), json, summary::markdown(input, found)];
     FILES.iter().zip(contents).try_for_each(|(name, text)| {
-        args.overwrite.save(&args.out.join(name), Product::Log, text.as_bytes())
+        overwrite.save(&args.out.join(name), Product::Log, text.as_bytes())
     })?;
-    picture::write(args, input, found)
+    picture::write(args, overwrite, input, found)
 }
 
 /// Poses as CSV with their standard deviations.

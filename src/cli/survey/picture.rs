@@ -2,7 +2,10 @@
 
 use super::{Args, Input};
 use crate::{
-    cli::{Failure, Outcome, output::Product},
+    cli::{
+        Failure, Outcome,
+        output::{Overwrite, Product},
+    },
     geometry::DVec2,
     plot::{EchoCause, SurveyView, WallCertainty, badge_among, draw_survey},
     survey::{PieceStatus, ReadingCause, Survey, SurveyedEnd},
@@ -21,7 +24,7 @@ const REGION_SIGMAS: f64 = 2.45;
 /// # Errors
 ///
 /// Failure of rendering, or write errors.
-pub(super) fn write(args: &Args, input: &Input, found: &Survey) -> Outcome {
+pub(super) fn write(args: &Args, overwrite: Overwrite, input: &Input, found: &Survey) -> Outcome {
     let walls: Vec<(WallCertainty, [DVec2; 2])> = found
         .walls
         .iter()
@@ -49,7 +52,7 @@ pub(super) fn write(args: &Args, input: &Input, found: &Survey) -> Outcome {
     })?;
     let contents = [picture.to_svg().into_bytes(), png];
     FILES.iter().zip(contents).try_for_each(|((name, product), bytes)| {
-        args.overwrite.save(&args.out.join(name), *product, &bytes)
+        overwrite.save(&args.out.join(name), *product, &bytes)
     })
 }
 

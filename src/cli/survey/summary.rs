@@ -50,6 +50,13 @@ fn remarks(found: &Survey) -> Vec<String> {
     if found.alternatives.is_empty() && is_settled {
         remarks.push("no other plan is within 10 nats of this one".to_owned());
     }
+    let open = found.poses.iter().filter(|of| !of.equivalent.is_empty()).count();
+    if open > 0 {
+        remarks.push(format!(
+            "warning: {} explained as well by other poses, from which the room looks alike: see survey.json",
+            format_count(open, "sweep")
+        ));
+    }
     for (other, number) in found.alternatives.iter().zip(1..) {
         remarks.push(format!(
             "alternative {number}: {}, probability {:.3} ({:+.1} nats)",

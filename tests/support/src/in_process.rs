@@ -45,6 +45,8 @@ use crate::{
 const STEP: Duration = Duration::from_millis(20);
 /// Real time left to the thread that writes the log before each request.
 const REAL_STEP: Duration = Duration::from_micros(300);
+/// Real time after which a log's thread that does not follow is taken for blocked.
+const LOG_LIMIT: Duration = Duration::from_secs(5);
 /// Simulated time after which a wait fails.
 const LIMIT: Duration = Duration::from_secs(120);
 
@@ -233,16 +235,30 @@ impl Daemon {
         self.get("/v1/health").json()
     }
 
-    /// Waits in simulated time.
+    /// Waits in simulated time, then for the log's thread.
     ///
     /// # Panics
-    /// If the condition stays false for two simulated minutes.
+    /// If the condition stays false for two simulated minutes, in which the log's thread had time to follow.
     pub fn wait_until(&self, what: &str, condition: impl Fn() -> bool) {
         let start = self.now();
         while !condition() {
             self.executor.block_on(async { sleep(STEP).await });
-            std::thread::sleep(REAL_STEP);
+            self.wait_for_log();
             assert!(self.now() - start < LIMIT, "waited in vain for {what}: {}", self.status());
+        }
+        self.wait_for_log();
+    }
+
+    /// Waits in real time until the log's thread has written all records, or can't.
+    fn wait_for_log(&self) {
+        let start = std::time::Instant::now();
+        let is_behind = || {
+            let log = self.control.log_status();
+            log.waiting > 0 && log.error.is_none()
+        };
+        std::thread::sleep(REAL_STEP);
+        while is_behind() && start.elapsed() < LOG_LIMIT {
+            std::thread::sleep(REAL_STEP);
         }
     }
 

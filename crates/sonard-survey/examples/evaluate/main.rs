@@ -13,7 +13,7 @@ use std::{error::Error, sync::Arc};
 use sonard_inverse::World;
 use sonard_model::{
     acoustics::{Air, Sensor},
-    geometry::{DVec2, Pose},
+    geometry::{DVec2, Pose, wrap_180},
     model::Options,
     scene::Scene,
 };
@@ -21,7 +21,7 @@ use sonard_survey::{
     NoObserver, OdometrySigma, PieceStatus, SearchEnd, Survey, SurveyOptions, score_plan, survey,
 };
 
-use measure::{Ends, RigidMotion, corner_errors_m, coverage, explained, median};
+use measure::{Ends, RigidMotion, corner_errors_m, coverage, explained, median, reflecting_walls};
 use rooms::{RoomKind, draw_course, draw_place, draw_room, drift, generator};
 use simulate::{ReadingNoise, sweeps};
 
@@ -33,6 +33,7 @@ struct Settings {
     beams: usize,
     odometry: [f64; 2],
     odometry_is_used: bool,
+    square_deg: Option<f64>,
     noise: ReadingNoise,
     is_verbose: bool,
     prints_walls: bool,
@@ -42,6 +43,10 @@ struct Settings {
 struct Trial {
     seed: u64,
     recall: f64,
+    /// Recall of the outer walls.
+    outer_recall: f64,
+    /// Number of inner walls that reflect a reading of the true room, and of those found.
+    faces: [usize; 2],
     precision: f64,
     corners_m: Vec<f64>,
     position_m: f64,
@@ -52,6 +57,8 @@ struct Trial {
     lead_nats: f64,
     /// Length of walls reported as observed that are none, metres.
     wrong_observed_m: f64,
+    /// Numbers of poses and corners whose 95 % interval holds the truth, each with that of all.
+    intervals: [[usize; 2]; 2],
     /// An alternative is the true room.
     is_listed: bool,
     end: SearchEnd,
@@ -64,6 +71,8 @@ const MAX_RANGE_M: f64 = 4.0;
 const HELD_PLACES: usize = 8;
 /// Shares of covered length from which a plan is complete.
 const COMPLETE: f64 = 0.995;
+/// Share of covered length from which a face of a box is found.
+const FOUND: f64 = 0.9;
 /// Deficit of score from which a failure is one of the search, nats.
 const SEARCH_NATS: f64 = 5.0;
 
@@ -99,7 +108,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 const HEAD: &str = "| kind | rooms | complete | recall | precision | corner mm | position mm | heading deg | \
-held | true room | score within 5 | wrong observed m | CPU s | scenes |";
+held | true room | score within 5 | wrong observed m | outer recall | faces found | 95 % of poses | 95 % of corners | CPU s | scenes |";
 
 fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn Error>> {
     let mut random = generator(kind, seed);
@@ -124,6 +133,7 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
     let [m_per_m, deg_per_m] = settings.odometry;
     let options = SurveyOptions {
         odometry: settings.odometry_is_used.then_some(OdometrySigma { m_per_m, deg_per_m }),
+        square_deg: settings.square_deg,
         ..SurveyOptions::default()
     };
     let start_s = cpu_s();
@@ -131,7 +141,7 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
     let seconds = cpu_s() - start_s;
     let truth: Vec<Ends> = world.scene.walls.iter().map(|wall| [wall.a, wall.b]).collect();
     let true_score = score_plan(&world, &readings, &options, &truth, &poses)?;
-    let found_poses: Vec<Pose> = found.poses.iter().map(|of| of.pose).collect();
+    let found_poses = nearest_poses(&found, &poses);
     let motion = RigidMotion::between(&found_poses, &poses);
     let walls = walls(&found, &motion);
     let [position_m, heading_deg] = motion.pose_errors(&found_poses, &poses);
@@ -146,7 +156,23 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
     if settings.prints_walls {
         print_walls(&found, &motion, &truth);
     }
+    // The frame of the survey is the first pose of odometry, which is the true one.
+    let intervals = [pose_intervals(&found, &poses), corner_intervals(&found, &truth)];
     let scene = found.scene("found", false).build()?;
+    let (outer, inner): (Vec<Ends>, Vec<Ends>) = {
+        let mut inner = Vec::new();
+        let reflecting = reflecting_walls(&world, &poses, settings.beams)?;
+        let numbered = world.scene.walls.iter().zip(&truth).enumerate();
+        let outer = numbered.filter(|(at, (wall, ends))| {
+            let is_inner = wall.id.starts_with("box");
+            if is_inner && reflecting.contains(at) {
+                inner.push(**ends);
+            }
+            !is_inner
+        });
+        (outer.map(|(_, (_, ends))| *ends).collect(), inner)
+    };
+    let is_found = |face: &&Ends| coverage(std::slice::from_ref(*face), &walls, 0.02, 2.0) > FOUND;
     let in_frame = |sweep: &sonard_inverse::FitSweep| motion.inverse_of(&sweep.pose);
     let is_listed = found.alternatives.iter().any(|plan| {
         let walls = plan.walls.iter().map(|ends| ends.map(|end| motion.of(end.into())));
@@ -157,6 +183,8 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
     Ok(Trial {
         seed,
         recall: coverage(&truth, &walls, 0.02, 2.0),
+        outer_recall: coverage(&outer, &walls, 0.02, 2.0),
+        faces: [inner.len(), inner.iter().filter(is_found).count()],
         precision: coverage(&walls, &truth, 0.02, 2.0),
         corners_m: corner_errors_m(&truth, &walls),
         position_m,
@@ -165,11 +193,64 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
         true_held: explained(&world, Scene::clone(&world.scene), &held_out, |sweep| sweep.pose)?,
         lead_nats: found.score - true_score,
         wrong_observed_m: wrong,
+        intervals,
         is_listed,
         end: found.end,
         scenes: found.scored_scenes,
         seconds,
     })
+}
+
+/// Poses found, of those that the survey lists as equivalent the ones nearest to the truth.
+fn nearest_poses(found: &Survey, truth: &[Pose]) -> Vec<Pose> {
+    /// Maximum number of combinations.
+    const MAX_LISTED: usize = 4096;
+    let mut all: Vec<Vec<Pose>> = vec![Vec::new()];
+    for of in &found.poses {
+        let choices = || [of.pose].into_iter().chain(of.equivalent.iter().copied());
+        let is_full = all.len() * choices().count() > MAX_LISTED;
+        let with = |known: &Vec<Pose>, next: Pose| [&known[..], &[next]].concat();
+        let count = if is_full { 1 } else { usize::MAX };
+        let longer =
+            all.iter().flat_map(|known| choices().take(count).map(|next| with(known, next)));
+        all = longer.collect();
+    }
+    let off_m = |poses: &Vec<Pose>| RigidMotion::between(poses, truth).pose_errors(poses, truth)[0];
+    all.into_iter().min_by(|a, b| off_m(a).total_cmp(&off_m(b))).unwrap_or_default()
+}
+
+/// Numbers of coordinates of poses within 1.96 standard deviations of the truth, and of all.
+fn pose_intervals(found: &Survey, truth: &[Pose]) -> [usize; 2] {
+    const NORMAL_95: f64 = 1.96;
+    let deviations = found.poses.iter().zip(truth).skip(1).filter_map(|(of, truth)| {
+        let [x_m, y_m] = of.sigma_m?;
+        let turn_deg = wrap_180(of.pose.heading_deg - truth.heading_deg);
+        Some([
+            (of.pose.x_m - truth.x_m) / x_m,
+            (of.pose.y_m - truth.y_m) / y_m,
+            turn_deg / of.sigma_heading_deg?,
+        ])
+    });
+    let inside: Vec<bool> = deviations.flatten().map(|off| off.abs() <= NORMAL_95).collect();
+    [inside.iter().filter(|is_inside| **is_inside).count(), inside.len()]
+}
+
+/// Numbers of ends of walls at a true corner within the 95 % ellipse, and of all with a covariance.
+fn corner_intervals(found: &Survey, truth: &[Ends]) -> [usize; 2] {
+    /// Quantile of the chi-square distribution with two degrees of freedom.
+    const CHI_SQUARE_95: f64 = 5.991;
+    const NEAR_M: f64 = 0.02;
+    let ends = found.walls.iter().flat_map(|wall| [&wall.from, &wall.to]);
+    let inside = ends.filter_map(|end| {
+        let [xx, xy, yy] = end.covariance_m2?;
+        let corners = truth.iter().flatten().map(|corner| DVec2::from(end.at_m) - *corner);
+        let off = corners.min_by(|a, b| a.length().total_cmp(&b.length()))?;
+        let square = yy * off.x * off.x - 2.0 * xy * off.x * off.y + xx * off.y * off.y;
+        let square = square / (xx * yy - xy * xy);
+        (off.length() < NEAR_M).then_some(square <= CHI_SQUARE_95)
+    });
+    let inside: Vec<bool> = inside.collect();
+    [inside.iter().filter(|is_inside| **is_inside).count(), inside.len()]
 }
 
 /// CPU time of all threads so far, seconds (Linux).
@@ -235,10 +316,14 @@ fn print_summary(kind: RoomKind, trials: &[Trial]) {
     let count = trials.len().max(1) as f64;
     let mean = |of: &dyn Fn(&Trial) -> f64| trials.iter().map(of).sum::<f64>() / count;
     let middle = |of: &dyn Fn(&Trial) -> f64| median(trials.iter().map(of).collect());
+    let intervals = |of: usize| {
+        let sum = |at: usize| trials.iter().map(|trial| trial.intervals[of][at]).sum::<usize>();
+        sum(0) as f64 / sum(1).max(1) as f64
+    };
     let corners: Vec<f64> =
         trials.iter().flat_map(|trial| trial.corners_m.iter().copied()).collect();
     println!(
-        "| {kind} | {} | {} | {:.3} | {:.3} | {:.2} | {:.2} | {:.3} | {:.3} | {:.3} | {} | {:.2} | {:.1} | {:.0} |",
+        "| {kind} | {} | {} | {:.3} | {:.3} | {:.2} | {:.2} | {:.3} | {:.3} | {:.3} | {} | {:.2} | {:.3} | {} of {} | {:.3} | {:.3} | {:.1} | {:.0} |",
         trials.len(),
         trials.iter().filter(|trial| trial.is_complete()).count(),
         mean(&|trial| trial.recall),
@@ -249,7 +334,13 @@ fn print_summary(kind: RoomKind, trials: &[Trial]) {
         mean(&|trial| trial.held),
         mean(&|trial| trial.true_held),
         trials.iter().filter(|trial| trial.lead_nats > -SEARCH_NATS).count(),
-        trials.iter().map(|trial| trial.wrong_observed_m).sum::<f64>(),
+        // Without the sign of a zero.
+        trials.iter().map(|trial| trial.wrong_observed_m).sum::<f64>().max(0.0) + 0.0,
+        mean(&|trial| trial.outer_recall),
+        trials.iter().map(|trial| trial.faces[1]).sum::<usize>(),
+        trials.iter().map(|trial| trial.faces[0]).sum::<usize>(),
+        intervals(0),
+        intervals(1),
         mean(&|trial| trial.seconds),
         mean(&|trial| trial.scenes as f64),
     );
@@ -264,6 +355,7 @@ impl Settings {
             beams: 400,
             odometry: [0.05, 5.0],
             odometry_is_used: true,
+            square_deg: None,
             noise: ReadingNoise { sigma_db: 0.5, offset_db: 0.0, sigma_m: 0.001 },
             is_verbose: false,
             prints_walls: false,
@@ -281,6 +373,10 @@ impl Settings {
                 }
                 "--no-odometry" => {
                     settings.odometry_is_used = false;
+                    continue;
+                }
+                "--square" => {
+                    settings.square_deg = Some(1.0);
                     continue;
                 }
                 _ => {}

@@ -1,11 +1,11 @@
 //! Comparison of a survey with the true room.
 
-use std::sync::Arc;
+use std::{collections::BTreeSet, sync::Arc};
 
-use sonard_inverse::{FitSweep, World};
+use sonard_inverse::{FitSweep, World, WorldError};
 use sonard_model::{
     geometry::{DVec2, Pose, distance_to_segment, wrap_180},
-    model::TooCostly,
+    model::{Reflector, TooCostly},
     reading::PingStatus,
     scene::Scene,
 };
@@ -94,6 +94,31 @@ pub(crate) fn corner_errors_m(truth: &[Ends], walls: &[Ends]) -> Vec<f64> {
         ends.fold(f64::INFINITY, f64::min)
     };
     corners.into_iter().map(nearest).collect()
+}
+
+/// Walls that reflect the predicted echoes of sweeps from given poses.
+pub(crate) fn reflecting_walls(
+    world: &World,
+    poses: &[Pose],
+    beams: usize,
+) -> Result<BTreeSet<usize>, WorldError> {
+    let simulator = world.simulator(&poses[0])?;
+    let mut found = BTreeSet::new();
+    for pose in poses {
+        let point = simulator.at(pose.position());
+        for at in 0..beams {
+            let azimuth_deg = at as f64 * 360.0 / beams as f64;
+            let predicted = point.ping(pose.direction_rad(azimuth_deg))?;
+            let path = predicted.arrival.as_ref().map(|arrival| &arrival.path);
+            found.extend(path.into_iter().flat_map(|path| path.reflectors()).filter_map(|of| {
+                match of {
+                    Reflector::Wall(wall) => Some(wall as usize),
+                    _ => None,
+                }
+            }));
+        }
+    }
+    Ok(found)
 }
 
 /// Share of readings that a scene predicts: echoes within 10 mm, and missing ones as such.

@@ -9,7 +9,7 @@ use crate::{
     error::SurveyError,
     progress::NoObserver,
     result::{PieceStatus, SearchEnd, Survey},
-    survey::{score_plan, survey},
+    survey::{resume_survey, score_plan, survey},
 };
 
 fn surveyed(observer: &dyn SurveyObserver, max_scenes: usize) -> Survey {
@@ -76,6 +76,23 @@ fn early_end_is_reported() {
     let cancelling = Cancelling::default();
     assert_eq!(surveyed(&cancelling, 30_000).end, SearchEnd::Cancelled);
     assert!(cancelling.0.load(Ordering::Relaxed));
+}
+
+#[test]
+fn resumed_survey_is_that_of_an_uninterrupted_one() {
+    let (corners, poses) = (rectangle(), stops());
+    let world = world(&corners);
+    let sweeps = sweeps(&world, &poses, &drifted(&poses));
+    let resumed = |scores: &PlanScores, max_scenes: usize| {
+        let options = SurveyOptions { max_scenes, ..options() };
+        resume_survey(&world, &sweeps, &options, scores, &NoObserver).expect("sweeps with arcs")
+    };
+    let scores = PlanScores::default();
+    assert_eq!(resumed(&scores, 100).end, SearchEnd::Budget);
+    let saved = scores.entries();
+    assert!(saved.len() > 50, "{}", saved.len());
+    let scores: PlanScores = saved.into_iter().collect();
+    assert_eq!(resumed(&scores, 30_000), surveyed(&NoObserver, 30_000));
 }
 
 #[test]

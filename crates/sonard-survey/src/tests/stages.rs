@@ -20,7 +20,8 @@ fn arcs_are_at_distances_of_walls_and_corners() {
     let (corners, poses) = (rectangle(), stops());
     let world = world(&corners);
     let sweeps = sweeps(&world, &poses, &poses);
-    let workspace = true_workspace(&world, &sweeps, &NoObserver);
+    let scores = PlanScores::default();
+    let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
     for (at, (readings, pose)) in workspace.readings.iter().zip(&poses).enumerate() {
         let arcs = find_arcs(at, readings);
         let walls = sides(&corners);
@@ -99,7 +100,8 @@ fn truth_is_not_beaten_by_its_neighbours() {
     let (corners, poses) = (rectangle(), stops());
     let world = world(&corners);
     let sweeps = sweeps(&world, &poses, &poses);
-    let workspace = true_workspace(&world, &sweeps, &NoObserver);
+    let scores = PlanScores::default();
+    let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
     let judge = Judge::new(&workspace, &poses, 0.004);
     // Two more lines across the room, without walls.
     let mut lines = sides(&corners);
@@ -131,7 +133,8 @@ fn climbing_closes_the_room() {
     let (corners, poses) = (rectangle(), stops());
     let world = world(&corners);
     let sweeps = sweeps(&world, &poses, &poses);
-    let workspace = true_workspace(&world, &sweeps, &NoObserver);
+    let scores = PlanScores::default();
+    let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
     let judge = Judge::new(&workspace, &poses, 0.004);
     let (mut plan, truth) = plan_of(&sides(&corners), &poses);
     for line in &mut plan.lines {

@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::{
-    alternatives::assess, judge::Judge, posed::PosedPlan, progress::NoObserver, result::PieceStatus,
+    alternatives::assess, judge::Judge, posed::PosedPlan, progress::NoObserver,
+    relocate::relocated, result::PieceStatus, symmetry::equivalent_poses,
 };
 
 /// A wall behind the walls of a closed room can't be observed, and neither can a wall across the
@@ -12,7 +13,8 @@ fn wall_without_evidence_is_never_observed() {
     let (corners, poses) = (rectangle(), stops());
     let world = world(&corners);
     let sweeps = sweeps(&world, &poses, &poses);
-    let workspace = true_workspace(&world, &sweeps, &NoObserver);
+    let scores = PlanScores::default();
+    let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
     let judge = Judge::new(&workspace, &poses, 0.004);
     let along = (corners[1] - corners[0]).normalize();
     let behind = [corners[0] - 0.5 * along.perp(), corners[1] - 0.5 * along.perp()];
@@ -35,4 +37,55 @@ fn wall_without_evidence_is_never_observed() {
         // The plan without it is better.
         assert!(assessment.better.is_some());
     }
+}
+
+/// A rectangle looks alike from two poses half a turn apart; odometry excludes one of them.
+#[test]
+fn half_turn_of_a_rectangle_is_open_without_odometry() {
+    let (corners, poses) = (rectangle(), stops());
+    let world = world(&corners);
+    let sweeps = sweeps(&world, &poses, &poses);
+    let (plan, walls) = plan_of(&sides(&corners), &poses);
+    let posed = PosedPlan { plan, walls, poses: poses.clone() };
+    for odometry in [None, options().odometry] {
+        let scores = PlanScores::default();
+        let options = SurveyOptions { odometry, ..options() };
+        let workspace =
+            workspace(&world, &sweeps, &options, (&NoObserver, &scores)).expect("sweeps");
+        let found = equivalent_poses(&posed, &Judge::new(&workspace, &poses, 0.004));
+        assert!(found[0].is_empty());
+        let (center, is_open) = (corners[0].midpoint(corners[2]), odometry.is_none());
+        for (equivalent, pose) in found.iter().zip(&poses).skip(1) {
+            assert_eq!(equivalent.len(), usize::from(is_open), "{equivalent:?}");
+            for other in equivalent {
+                assert!(other.position().distance(2.0 * center - pose.position()) < 1e-6);
+                assert!((other.heading_deg - pose.heading_deg).abs() - 180.0 < 1e-6);
+            }
+        }
+    }
+}
+
+/// A pose far from the true one, by which the walls of the others explain nothing.
+#[test]
+fn lost_sweep_is_located_in_the_plan_of_the_others() {
+    let (corners, truth) = (rectangle(), stops());
+    let world = world(&corners);
+    let sweeps = sweeps(&world, &truth, &truth);
+    let options = SurveyOptions { odometry: None, ..options() };
+    let scores = PlanScores::default();
+    let workspace = workspace(&world, &sweeps, &options, (&NoObserver, &scores)).expect("sweeps");
+    let mut poses = truth.clone();
+    let posed = |poses: &[Pose]| {
+        let (plan, walls) = plan_of(&sides(&corners), poses);
+        PosedPlan { plan, walls, poses: poses.to_vec() }
+    };
+    assert_eq!(relocated(&posed(&truth), &Judge::new(&workspace, &truth, 0.004)), None);
+    poses[2] = Pose { x_m: truth[2].x_m - 0.3, y_m: truth[2].y_m - 0.2, heading_deg: 40.0 };
+    let found = relocated(&posed(&poses), &Judge::new(&workspace, &poses, 0.004));
+    let found = found.expect("a better pose");
+    // The room looks alike from the pose half a turn away.
+    let half_turn = 2.0 * corners[0].midpoint(corners[2]) - truth[2].position();
+    let off_m = [truth[2].position(), half_turn].map(|at| at.distance(found[2].position()));
+    assert!(off_m.iter().any(|off_m| *off_m < 0.005), "{off_m:?}");
+    assert_eq!([found[0], found[1], found[3]], [truth[0], truth[1], truth[3]]);
 }
