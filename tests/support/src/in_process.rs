@@ -253,7 +253,7 @@ impl Daemon {
     fn wait_for_log(&self) {
         let start = std::time::Instant::now();
         let is_behind = || {
-            let log = self.control.log_status();
+            let log = self.executor.block_on(async { self.control.handle.status().log });
             log.waiting > 0 && log.error.is_none()
         };
         std::thread::sleep(REAL_STEP);
