@@ -1,16 +1,20 @@
 //! Approximation of circular arcs by walls.
 
+#[cfg(feature = "dxf")]
 use std::f64::consts::PI;
 
+#[cfg(feature = "dxf")]
 use sonard_model::geometry::DVec2;
 
 /// Maximum deviation of walls from a curve, metres.
 pub(crate) const MAX_CURVE_ERROR_M: f64 = 1e-3;
 /// Minimum and maximum number of walls of a full circle.
+#[cfg(feature = "dxf")]
 const CIRCLE_WALLS: (f64, f64) = (12.0, 360.0);
 
 /// Corners along a circular arc from `from` (exclusive) by an angle about a centre, radians,
 /// counter-clockwise.
+#[cfg(feature = "dxf")]
 pub(crate) fn arc(center: DVec2, from: DVec2, turn_rad: f64) -> impl Iterator<Item = DVec2> {
     let radius = from - center;
     let (min, max) = CIRCLE_WALLS;
@@ -22,7 +26,7 @@ pub(crate) fn arc(center: DVec2, from: DVec2, turn_rad: f64) -> impl Iterator<It
     })
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "dxf"))]
 mod tests {
     use super::*;
 
