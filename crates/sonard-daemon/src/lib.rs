@@ -334,18 +334,8 @@ fn first_status(settings: &Settings) -> PublishedStatus {
         array: settings.simulated.as_ref().map(|simulated| Arc::clone(&simulated.array)),
         air: AirControl::new(settings.keys.air.clone()),
     };
-    let link = LinkSnapshot {
-        state: LinkState::Opening,
-        since: Timestamp::now(),
-        changed: Instant::now(),
-        port: settings.keys.device.port.clone().unwrap_or_default(),
-        trouble: None,
-        failures: 0,
-        retry_at: None,
-        identity: None,
-        device: None,
-        provenance: None,
-    };
+    let port = settings.keys.device.port.clone().unwrap_or_default();
+    let link = LinkSnapshot::new(LinkState::Opening, port);
     let control = ControlSnapshot {
         next: scan_settings,
         scanning: settings.keys.scanning.clone(),

@@ -40,8 +40,6 @@ pub(super) struct SimulatedArray {
     /// Current session record of the log.
     session: Option<Session>,
     state: LinkState,
-    since: Timestamp,
-    changed: Instant,
     scans: ScanTotals,
 }
 
@@ -62,8 +60,6 @@ impl SimulatedArray {
             firing_grid: FiringGrid::new(Instant::now()),
             session: None,
             state: LinkState::Ready,
-            since: Timestamp::now(),
-            changed: Instant::now(),
             scans: ScanTotals::default(),
         }
     }
@@ -248,11 +244,8 @@ impl SimulatedArray {
     }
 
     fn enter(&mut self, state: LinkState) {
-        if std::mem::replace(&mut self.state, state) != state {
-            (self.since, self.changed) = (Timestamp::now(), Instant::now());
-            if state == LinkState::Stopped {
-                tracing::info!("stopped");
-            }
+        if std::mem::replace(&mut self.state, state) != state && state == LinkState::Stopped {
+            tracing::info!("stopped");
         }
         self.publish_status();
     }
@@ -260,18 +253,10 @@ impl SimulatedArray {
     /// Publishes the current status and settings.
     fn publish_status(&mut self) {
         let control = &self.control;
+        // A configured port is not opened.
         let link = LinkSnapshot {
-            state: self.state,
-            since: self.since,
-            changed: self.changed,
-            // A configured port is not opened.
-            port: String::new(),
-            trouble: None,
-            failures: 0,
-            retry_at: None,
-            identity: None,
-            device: None,
             provenance: Some(Provenance::Simulated),
+            ..LinkSnapshot::new(self.state, String::new())
         };
         let simulation = control.settings.simulated.as_ref().map(|simulated| {
             let array = Arc::clone(&simulated.array);

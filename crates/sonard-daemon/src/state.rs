@@ -175,7 +175,7 @@ impl DaemonState {
             |at: Option<Instant>| at.map(|at| at.saturating_duration_since(now).as_secs_f64());
         let published = self.published().clone();
         let (current, pending) = (published.current().clone(), published.pending(now));
-        let PublishedStatus { link, control, .. } = published.clone();
+        let PublishedStatus { link, control, next_at, scan, simulation, .. } = published;
         Status {
             robot: self.robot.clone(),
             sonard: env!("CARGO_PKG_VERSION").into(),
@@ -198,13 +198,13 @@ impl DaemonState {
                 every_s: control.scanning.every_s,
                 paused: control.paused,
                 requested: control.requested,
-                next_in_s: until(published.next_at),
+                next_in_s: until(next_at),
             },
             last_reading_age_s: self
                 .scans()
                 .read
                 .map(|read| now.duration_since(read).as_secs_f64()),
-            scan: published.scan.map(|(scan, beams)| ScanProgress {
+            scan: scan.map(|(scan, beams)| ScanProgress {
                 scan,
                 beams,
                 done: self.beams_done.load(Ordering::Relaxed),
@@ -221,7 +221,7 @@ impl DaemonState {
             ros: lock(&self.ros).clone(),
             mqtt: lock(&self.mqtt).clone(),
             configuration: control.configuration,
-            simulation: published.simulation,
+            simulation,
         }
     }
 

@@ -63,6 +63,24 @@ pub(in super::super) struct LinkSnapshot {
     pub(in super::super) provenance: Option<Provenance>,
 }
 
+impl LinkSnapshot {
+    /// Snapshot of a link without trouble and without a device that enters its state now.
+    pub(in super::super) fn new(state: LinkState, port: String) -> Self {
+        Self {
+            state,
+            since: Timestamp::now(),
+            changed: Instant::now(),
+            port,
+            trouble: None,
+            failures: 0,
+            retry_at: None,
+            identity: None,
+            device: None,
+            provenance: None,
+        }
+    }
+}
+
 /// Settings of the next scan, schedule and configuration.
 #[derive(Debug, Clone)]
 pub(in super::super) struct ControlSnapshot {
@@ -294,18 +312,7 @@ mod tests {
     }
 
     fn link(state: LinkState, at: Instant) -> LinkSnapshot {
-        LinkSnapshot {
-            state,
-            since: Timestamp::UNIX_EPOCH,
-            changed: at,
-            port: "/dev/ttyACM0".to_owned(),
-            trouble: None,
-            failures: 0,
-            retry_at: None,
-            identity: None,
-            device: None,
-            provenance: None,
-        }
+        LinkSnapshot { changed: at, ..LinkSnapshot::new(state, "/dev/ttyACM0".to_owned()) }
     }
 
     fn status() -> PublishedStatus {
