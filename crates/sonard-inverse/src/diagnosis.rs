@@ -156,11 +156,7 @@ pub fn diagnose(
     if let Some(correction) = best_correction(world, atlas, sweep) {
         return vec![correction];
     }
-    let best = modes.first().map(|mode| Pose {
-        x_m: mode.x_m,
-        y_m: mode.y_m,
-        heading_deg: mode.heading_deg,
-    });
+    let best = modes.first().map(PoseMode::pose);
     let evidence = [
         outside_sensor_limits(world, sweep),
         beyond_scene(world, sweep),

@@ -53,6 +53,12 @@ pub struct NuisanceEstimate {
 }
 
 impl PoseMode {
+    /// Pose of the hypothesis.
+    #[must_use]
+    pub const fn pose(&self) -> Pose {
+        Pose { x_m: self.x_m, y_m: self.y_m, heading_deg: self.heading_deg }
+    }
+
     /// Hypothesis from a fit, with probability 1; nuisance parameters are relative to `world`.
     fn from_fit(fitted: &FitResult, world: &World, besides: &[Prior]) -> Self {
         let (pose, of) = (&fitted.poses[0], &fitted.estimates);

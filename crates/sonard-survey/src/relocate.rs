@@ -6,8 +6,7 @@ use sonard_inverse::{CoarseGrid, locate};
 use sonard_model::geometry::Pose;
 
 use crate::{
-    judge::Judge, options::EXPLAINED_M, posed::PosedPlan, symmetry::odometry_loss,
-    trace::unexplained,
+    judge::Judge, options::EXPLAINED_M, posed::PosedPlan, symmetry::pose_score, trace::unexplained,
 };
 
 /// Share of its arcs unexplained from which a sweep is lost.
@@ -37,13 +36,10 @@ pub(crate) fn relocated(posed: &PosedPlan, judge: &Judge) -> Option<Vec<Pose>> {
     let mut poses = posed.poses.clone();
     let mut is_changed = false;
     for sweep in lost {
-        let score = |pose: &Pose| {
-            let readings = judge.log_likelihood_of(&simulator, sweep, pose)?;
-            Some(readings - odometry_loss(posed, judge, sweep, pose))
-        };
+        let score = |pose: &Pose| pose_score(posed, judge, &simulator, sweep, pose);
         let modes = locate(&world, &grid, &workspace.sweeps[sweep]).unwrap_or_default();
         let scored = modes.iter().filter_map(|mode| {
-            let pose = Pose { x_m: mode.x_m, y_m: mode.y_m, heading_deg: mode.heading_deg };
+            let pose = mode.pose();
             Some((score(&pose)?, pose))
         });
         let best = scored.max_by(|a, b| a.0.total_cmp(&b.0));

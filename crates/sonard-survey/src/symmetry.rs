@@ -1,6 +1,9 @@
 //! Poses that explain a sweep as well as the one found because the room looks alike from them.
 
-use sonard_model::geometry::{DVec2, Pose, wrap_180};
+use sonard_model::{
+    geometry::{DVec2, Pose, wrap_180},
+    model::Simulator,
+};
 
 use crate::{alternatives::LISTED_NATS, arrangement::Segment, judge::Judge, posed::PosedPlan};
 
@@ -40,10 +43,7 @@ pub(crate) fn equivalent_poses(posed: &PosedPlan, judge: &Judge) -> Vec<Vec<Pose
     let motions = motions(&segments);
     let mut found = none();
     for (sweep, pose) in posed.poses.iter().enumerate().skip(1) {
-        let score = |pose: &Pose| {
-            let readings = judge.log_likelihood_of(&simulator, sweep, pose)?;
-            Some(readings - odometry_loss(posed, judge, sweep, pose))
-        };
+        let score = |pose: &Pose| pose_score(posed, judge, &simulator, sweep, pose);
         let Some(own) = score(pose) else { continue };
         for other in motions.iter().map(|motion| motion.of(pose)) {
             let is_new =
@@ -66,8 +66,21 @@ fn motions(segments: &[Segment]) -> Vec<Motion> {
     both.map(|ends| Motion::between([longest.a, longest.b], ends)).collect()
 }
 
+/// Log-likelihood of a sweep's readings and of the moves to and from it with another pose, nats;
+/// `None` if the scene has more paths than the model follows. The first sweep is the frame.
+pub(crate) fn pose_score(
+    posed: &PosedPlan,
+    judge: &Judge,
+    simulator: &Simulator,
+    sweep: usize,
+    pose: &Pose,
+) -> Option<f64> {
+    let readings = judge.log_likelihood_of(simulator, sweep, pose)?;
+    Some(readings - odometry_loss(posed, judge, sweep, pose))
+}
+
 /// Negative log-density of the moves to and from a sweep with another pose, nats.
-pub(crate) fn odometry_loss(posed: &PosedPlan, judge: &Judge, sweep: usize, pose: &Pose) -> f64 {
+fn odometry_loss(posed: &PosedPlan, judge: &Judge, sweep: usize, pose: &Pose) -> f64 {
     let moves = &judge.workspace.moves;
     let before = moves.get(sweep - 1).map(|step| step.loss(&posed.poses[sweep - 1], pose));
     let after = moves.get(sweep).zip(posed.poses.get(sweep + 1));

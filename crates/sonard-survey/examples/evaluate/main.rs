@@ -231,8 +231,7 @@ fn pose_intervals(found: &Survey, truth: &[Pose]) -> [usize; 2] {
             turn_deg / of.sigma_heading_deg?,
         ])
     });
-    let inside: Vec<bool> = deviations.flatten().map(|off| off.abs() <= NORMAL_95).collect();
-    [inside.iter().filter(|is_inside| **is_inside).count(), inside.len()]
+    count_inside(deviations.flatten().map(|off| off.abs() <= NORMAL_95))
 }
 
 /// Numbers of ends of walls at a true corner within the 95 % ellipse, and of all with a covariance.
@@ -249,8 +248,12 @@ fn corner_intervals(found: &Survey, truth: &[Ends]) -> [usize; 2] {
         let square = square / (xx * yy - xy * xy);
         (off.length() < NEAR_M).then_some(square <= CHI_SQUARE_95)
     });
-    let inside: Vec<bool> = inside.collect();
-    [inside.iter().filter(|is_inside| **is_inside).count(), inside.len()]
+    count_inside(inside)
+}
+
+/// Numbers of values inside, and of all.
+fn count_inside(are_inside: impl Iterator<Item = bool>) -> [usize; 2] {
+    are_inside.fold([0, 0], |[inside, all], is_inside| [inside + usize::from(is_inside), all + 1])
 }
 
 /// CPU time of all threads so far, seconds (Linux).
