@@ -143,9 +143,8 @@ fn wait_is_interruptible() {
     for by_stop in [false, true] {
         let mut child = scan(&daemon, &own).spawn().expect("it runs");
         let mut notices = BufReader::new(child.stderr.take().expect("piped")).lines();
-        let mut is_started =
-            || notices.any(|line| line.expect("text").contains("scan 1 of 50 started"));
-        assert!(is_started());
+        let is_started = notices.any(|line| line.expect("text").contains("scan 1 of 50 started"));
+        assert!(is_started);
         wait_until("beams", || daemon.status()["scan"]["done"].as_u64() > Some(3));
         if by_stop {
             assert_eq!(daemon.send("POST", "/v1/stop", "").status, 202);

@@ -100,20 +100,19 @@ impl Receiver {
         noise: &ReceiverNoise,
         rng: &mut impl rand::Rng,
     ) -> Detection {
-        let firings =
-            (0..self.averaged_firings).map(|_| self.fire_in_noise(arrivals, incident, noise, rng));
+        let firing = Firing::new(self, arrivals, incident);
+        let firings = (0..self.averaged_firings).map(|_| self.fire_in_noise(firing, noise, rng));
         self.quantized(self.average(firings.collect()))
     }
 
     fn fire_in_noise(
         &self,
-        arrivals: &[PulseArrival],
-        incident: &dyn Fn(&PulseArrival) -> Option<Incident>,
+        firing: Firing,
         noise: &ReceiverNoise,
         rng: &mut impl rand::Rng,
     ) -> Detection {
         let track = noise.track(self, rng);
-        let firing = Firing { noise: Some(&track), ..Firing::new(self, arrivals, incident) };
+        let firing = Firing { noise: Some(&track), ..firing };
         let (mut detection, _) = self.detection(firing, Latch::Rearmed, 0.0);
         for (i, echo_us) in detection.echoes_us.iter_mut().enumerate() {
             let jitter_us = noise.jitter(rng);
