@@ -179,13 +179,20 @@ smoke_playground() {
   (cd web/wasm && CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$root/target}/wasm gently cargo check --locked --quiet)
 }
 
+develop_python() {
+  if [ "${PYTHON:-1}" = 0 ]; then return; fi
+  step "unoptimised build of the Python package"
+  gently python/test.sh develop || fail "the Python package: see above. PYTHON=0 leaves it out"
+}
+
+# After the build of the tests: the package is compared with the program.
 smoke_python() {
   if [ "${PYTHON:-1}" = 0 ]; then
     step "smoke test of the Python package: LEFT OUT, because PYTHON=0"
     return
   fi
   step "smoke test of the Python package"
-  gently python/test.sh smoke || fail "the Python package: see above. PYTHON=0 leaves it out"
+  python/test.sh smoke || fail "the Python package: see above. PYTHON=0 leaves it out"
 }
 
 check_units() {
@@ -376,7 +383,7 @@ quick)
 default)
   check_tools
   lane "tools of others" prepare_browser
-  lane "apart from the workspace" smoke_playground smoke_python
+  lane "apart from the workspace" smoke_playground develop_python
   check_text
   check_pure_part
   build_tests
@@ -384,6 +391,7 @@ default)
   smoke_page
   check_examples
   join "apart from the workspace"
+  smoke_python
   step "tests"
   run_tests || finish $?
   ;;

@@ -5,7 +5,8 @@
 #   python/test.sh                          with the python3 on the path
 #   python/test.sh build                    the wheel and lints alone, which needs no command `sonard`
 #   python/test.sh tests                    the rest, with the wheel that was built
-#   python/test.sh smoke                    an unoptimised build, and the tests of the model
+#   python/test.sh develop                  an unoptimised build, which needs no command `sonard`
+#   python/test.sh smoke                    the same, and the tests of the model
 #   PYTHON_INTERPRETERS="python3.10 python3.13" python/test.sh   run the tests with each of these, too
 #
 # The command `sonard` that readings are compared with is taken from the repository's target/debug; if there is
@@ -50,12 +51,19 @@ run_tests() {
   done
 }
 
-smoke() {
+develop() {
   VIRTUAL_ENV=$PWD/target/venv-smoke target/venv-smoke/bin/maturin develop --locked --quiet
+}
+
+smoke() {
+  develop
   target/venv-smoke/bin/pytest --quiet tests/test_model.py
 }
 
-if [ "${1:-}" = smoke ]; then needed=(maturin numpy pytest hypothesis) venv=target/venv-smoke; else venv=target/venv; fi
+case ${1:-} in
+develop | smoke) needed=(maturin numpy pytest hypothesis) venv=target/venv-smoke ;;
+*) venv=target/venv ;;
+esac
 ../tests/venv.sh "$venv" PYTHON=0 "${needed[@]}"
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -66,9 +74,10 @@ case ${1:-} in
   ;;
 build) build_wheel ;;
 tests) run_tests ;;
+develop) develop ;;
 smoke) smoke ;;
 *)
-  echo "python/test.sh: all (no argument), build, tests or smoke, not $1" >&2
+  echo "python/test.sh: all (no argument), build, tests, develop or smoke, not $1" >&2
   exit 1
   ;;
 esac
