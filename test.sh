@@ -24,6 +24,7 @@
 #   PROMTOOL=0           without promtool (Debian package prometheus)
 #   FAKETIME=0           without the clock that is set (libfaketime)
 #   PLATFORMS=0          without Clippy for macOS and Windows
+#   INSTRUCTIONS=0       without instruction counts (Debian package valgrind)
 #   DIST=0               without the installation of a release that is packed around the tests' program
 #   BOOT=0               without units under a booted systemd (systemd/boot-test.sh)
 #   PACKAGE=1            with the Debian package around the tests' program: build, installation, upgrade, removal;
@@ -200,6 +201,17 @@ check_units() {
   systemd/test.sh
 }
 
+count_instructions() {
+  if [ "${INSTRUCTIONS:-1}" = 0 ]; then
+    step "instruction counts: LEFT OUT, because INSTRUCTIONS=0"
+    return
+  fi
+  step "instruction counts"
+  if ! command -v valgrind >/dev/null; then tests/install.sh "leave them out with INSTRUCTIONS=0" valgrind; fi
+  local built=${CARGO_TARGET_DIR:-target}/debug
+  "$built/xtask" instructions "$built/instructions" || fail "a computation takes more: see above. INSTRUCTIONS=0 leaves them out"
+}
+
 get_package_tools() {
   if [ "${PACKAGE:-0}" = 0 ]; then return; fi
   step "tools for the Debian package"
@@ -334,8 +346,9 @@ run_tests() {
   if [ "$runner" = nextest ]; then
     local filter=()
     if [ ${#skipped[@]} != 0 ]; then filter=(-E "not test(/$(alternatives "${skipped[@]}")/)"); fi
+    # Half of the tests wait for a process or a clock most of their time.
     cargo nextest run "${selection[@]}" "$@" "${filter[@]}" --cargo-quiet --no-fail-fast \
-      --status-level slow --final-status-level fail 2>&1
+      --test-threads $((2 * $(nproc))) --status-level slow --final-status-level fail 2>&1
   else
     local name skip=()
     # A browser takes the processors that other tests want.
@@ -345,7 +358,7 @@ run_tests() {
   fi | tee "$work/tests" | head -n "-$closing_lines"
 }
 
-# By nextest's configuration browser tests run alone.
+# By nextest's configuration one browser test runs at a time.
 test_page() {
   if [ "${PAGE:-1}" = 0 ] || [ "$runner" = nextest ]; then return; fi
   step "the live page"
@@ -361,7 +374,11 @@ tested=(--lib --bins --tests)
 closing_lines=3
 # Packages and features: the default members with default features, or everything.
 selection=()
-if [ "$tier" = all ]; then selection=(--workspace --features sonard/full); fi
+if [ "$tier" = all ]; then
+  selection=(--workspace --features sonard/full)
+  # Nothing is built twice, and instruction counts hold for builds that are not incremental.
+  export CARGO_INCREMENTAL=${CARGO_INCREMENTAL:-0}
+fi
 # A change is judged by the same random cases as the one before it.
 export PROPTEST_RNG_SEED=${PROPTEST_RNG_SEED:-2026}
 export SONARD_FIRMWARE=${SONARD_FIRMWARE:-$PWD/firmware/target/avr-none/release/sonard-firmware.elf}
@@ -405,7 +422,7 @@ all)
   build_tests
   join "tools of others"
   lane "programs of others" check_api check_peers check_monitoring play_emulator
-  lane "units and package" check_units check_package
+  lane "units and package" check_units check_package count_instructions
   check_documentation
   check_examples
   join "apart from the workspace"

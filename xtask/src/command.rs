@@ -26,6 +26,19 @@ pub(crate) fn read(command: &mut Command) -> Result<String, Failure> {
     Ok(String::from_utf8(output.stdout)?.trim_end().to_owned())
 }
 
+/// Runs a program and returns its standard error output.
+///
+/// # Errors
+/// A program that can't be started or fails.
+pub(crate) fn read_errors(command: &mut Command) -> Result<String, Failure> {
+    let output = command.output().map_err(|error| describe(command, &error))?;
+    let printed = String::from_utf8_lossy(&output.stderr).into_owned();
+    if !output.status.success() {
+        return Err(format!("{}: {printed}", describe(command, &output.status)).into());
+    }
+    Ok(printed)
+}
+
 fn describe(command: &Command, reason: &dyn std::fmt::Display) -> Failure {
     let program = command.get_program().to_string_lossy();
     let arguments: Vec<_> = command.get_args().map(|part| part.to_string_lossy()).collect();

@@ -1,13 +1,17 @@
-//! Builds what a release consists of: `cargo xtask dist`.
+//! Tasks of the repository: releases, instruction counts, mutation tests, costs of builds.
 //!
-//! Each artefact depends on the commit and on the pinned tools only: times are the commit's, paths
+//! Each artefact of a release depends on the commit and on the pinned tools only: times are the commit's, paths
 //! of the building computer are replaced, archives are sorted. Two builds of a commit are equal
 //! byte for byte.
 
 mod archive;
 mod binary;
+mod build_cost;
 mod command;
 mod deb;
+mod folders;
+mod instructions;
+mod mutants;
 mod options;
 mod release;
 mod sbom;
@@ -17,27 +21,66 @@ mod wheel;
 
 use std::{fs, process::ExitCode};
 
+use build_cost::CostOptions;
+use instructions::InstructionOptions;
+use lexopt::{Parser, ValueExt as _};
+use mutants::MutantOptions;
 use options::{Artefact, Options};
 use release::Release;
 
 /// Description of the first failure.
 pub(crate) type Failure = Box<dyn std::error::Error>;
 
+const HELP: &str = "\
+Usage: cargo xtask dist | instructions | mutants | build-cost
+
+  dist           build the artefacts of a release
+  instructions   compare the instruction counts of fixed workloads
+  mutants        find changes of the pure core that its unit tests do not notice
+  build-cost     measure builds of commits, and rebuilds after a changed line
+
+`cargo xtask TASK --help` lists the options of a task.";
+
 fn main() -> ExitCode {
-    let outcome = Options::parse().and_then(|options| match options {
-        Some(options) => build(&options),
-        None => {
-            println!("{}", options::HELP);
-            Ok(())
-        }
-    });
-    match outcome {
+    match run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             eprintln!("xtask: {failure}");
             ExitCode::FAILURE
         }
     }
+}
+
+fn run() -> Result<(), Failure> {
+    let mut arguments = Parser::from_env();
+    let task = match arguments.next()? {
+        Some(lexopt::Arg::Value(task)) => task.string()?,
+        None | Some(lexopt::Arg::Short('h') | lexopt::Arg::Long("help")) => {
+            println!("{HELP}");
+            return Ok(());
+        }
+        Some(other) => return Err(other.unexpected().into()),
+    };
+    match task.as_str() {
+        "dist" => match Options::parse(arguments)? {
+            Some(options) => build(&options)?,
+            None => println!("{}", options::HELP),
+        },
+        "instructions" => match InstructionOptions::parse(arguments)? {
+            Some(options) => instructions::check(&options)?,
+            None => println!("{}", instructions::HELP),
+        },
+        "mutants" => match MutantOptions::parse(arguments)? {
+            Some(options) => mutants::test(&options)?,
+            None => println!("{}", mutants::HELP),
+        },
+        "build-cost" => match CostOptions::parse(arguments)? {
+            Some(options) => build_cost::measure(&options)?,
+            None => println!("{}", build_cost::HELP),
+        },
+        other => return Err(format!("{other}: no task; see cargo xtask --help").into()),
+    }
+    Ok(())
 }
 
 /// Builds the requested artefacts, and lists all files of the folder with their digests.

@@ -60,15 +60,11 @@ pub(crate) struct Options {
 }
 
 impl Options {
-    /// Parses the arguments of this process; `None` if help is requested.
+    /// Parses the arguments after the verb; `None` if help is requested.
     ///
     /// # Errors
     /// Unknown arguments, artefacts or targets.
-    pub(crate) fn parse() -> Result<Option<Self>, Failure> {
-        Self::parse_from(Parser::from_env())
-    }
-
-    fn parse_from(mut arguments: Parser) -> Result<Option<Self>, Failure> {
+    pub(crate) fn parse(mut arguments: Parser) -> Result<Option<Self>, Failure> {
         let mut options = Self {
             artefacts: ARTEFACTS.map(|(_, artefact)| artefact).into(),
             targets: TARGETS.into(),
@@ -76,10 +72,8 @@ impl Options {
             program: None,
             wheel: None,
         };
-        let mut verb = None;
         while let Some(argument) = arguments.next()? {
             match argument {
-                Arg::Value(name) if verb.is_none() => verb = Some(name.string()?),
                 Arg::Long("only") => {
                     options.artefacts = chosen(&arguments.value()?.string()?, &ARTEFACTS)?;
                 }
@@ -93,9 +87,6 @@ impl Options {
                 Arg::Short('h') | Arg::Long("help") => return Ok(None),
                 other => return Err(other.unexpected().into()),
             }
-        }
-        if verb.as_deref() != Some("dist") {
-            return Ok(None);
         }
         let is_given = options.program.is_some() || options.wheel.is_some();
         if is_given && options.targets.len() != 1 {
@@ -120,17 +111,18 @@ mod tests {
     use super::*;
 
     fn parse(arguments: &[&str]) -> Result<Option<Options>, Failure> {
-        Options::parse_from(Parser::from_args(arguments))
+        Options::parse(Parser::from_args(arguments))
     }
 
     #[test]
     fn names_are_checked() {
-        let options = parse(&["dist", "--only", "deb,sbom"]).expect("valid").expect("no help");
+        let options = parse(&["--only", "deb,sbom"]).expect("valid").expect("no help");
         assert_eq!(options.artefacts, [Artefact::Deb, Artefact::Sbom]);
         assert_eq!(options.targets, TARGETS);
-        assert!(parse(&["dist", "--only", "rpm"]).is_err());
-        assert!(parse(&["dist", "--target", "riscv64gc-unknown-linux-gnu"]).is_err());
-        assert!(parse(&["dist", "--program", "a"]).is_err(), "of which target?");
-        assert!(parse(&[]).expect("help").is_none());
+        assert!(parse(&["--only", "rpm"]).is_err());
+        assert!(parse(&["--target", "riscv64gc-unknown-linux-gnu"]).is_err());
+        assert!(parse(&["--program", "a"]).is_err(), "of which target?");
+        assert!(parse(&["--help"]).expect("help").is_none());
+        assert!(parse(&["dist"]).is_err(), "a verb twice");
     }
 }

@@ -1,17 +1,13 @@
 //! Release of the checked-out commit: version, time, folders, and the environment of builds.
 
-use std::{
-    collections::BTreeMap,
-    env, fs,
-    path::{Path, PathBuf},
-    process::Command,
-};
+use std::{collections::BTreeMap, env, fs, path::PathBuf, process::Command};
 
 use sha2::{Digest as _, Sha256};
 
 use crate::{
     Failure,
     command::{read, run},
+    folders,
     options::Options,
     tools::{Tools, add_target},
 };
@@ -46,11 +42,11 @@ impl Release {
     /// # Errors
     /// No git checkout.
     pub(crate) fn of_checkout(options: &Options) -> Result<Self, Failure> {
-        let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().ok_or("no workspace")?;
+        let root = folders::root()?;
         let git = |arguments: &[&str]| read(Command::new("git").args(arguments).current_dir(root));
         let commit = git(&["rev-parse", "--short=12", "HEAD"])?;
         let changes = git(&["status", "--porcelain", "--untracked-files=no"])?;
-        let target = env::var_os("CARGO_TARGET_DIR").map_or(root.join("target"), PathBuf::from);
+        let target = folders::target()?;
         Ok(Self {
             dist: options.out.clone().unwrap_or_else(|| target.join("dist")),
             version: env!("CARGO_PKG_VERSION").to_owned(),

@@ -21,7 +21,7 @@ use tokio::{
     time::timeout,
 };
 
-pub use live::LiveLines;
+pub use live::{IDLE_TIMEOUT, LiveLines};
 pub use scans::{RequestedScans, ScansError};
 
 use crate::api::{Accepted, Problem};
@@ -65,7 +65,7 @@ pub enum ClientError {
     /// No data on a live stream, not even its keep-alive lines.
     #[error(
         "no data from the daemon for {} s: it hangs, or the connection is lost",
-        live::IDLE_TIMEOUT.as_secs()
+        IDLE_TIMEOUT.as_secs()
     )]
     IdleTimeout,
     /// Connection that ended without a complete response.

@@ -14,7 +14,7 @@ use super::{Args, load::Loader};
 use crate::{
     cli::Failure,
     daemon::{self, Handle, Journal, OpenPort, Order, Resources},
-    host_gpio::NoHostGpio,
+    host_gpio::{HostGpio, NoHostGpio},
     link::{Holders, LinkError},
     mock::{MemorySocket, MockPort, Note, Pace},
     server::{Listeners, Peer, Server},
@@ -54,6 +54,17 @@ impl EmbeddedDaemon {
     pub fn from_options(
         options: &[&str],
     ) -> Result<(Self, impl Future<Output = Result<(), String>> + Send + use<>), Failure> {
+        Self::with_gpio(options, Box::new(NoHostGpio))
+    }
+
+    /// Prepares a daemon as [`from_options`](Self::from_options), with pins of the host.
+    ///
+    /// # Errors
+    /// As [`from_options`](Self::from_options).
+    pub fn with_gpio(
+        options: &[&str],
+        gpio: Box<dyn HostGpio>,
+    ) -> Result<(Self, impl Future<Output = Result<(), String>> + Send + use<>), Failure> {
         let command = Args::augment_args(Command::new("run").no_binary_name(true));
         let matches = command.try_get_matches_from(options);
         let args = matches.and_then(|matches| Args::from_arg_matches(&matches));
@@ -91,7 +102,6 @@ impl EmbeddedDaemon {
             Some(_) => daemon::prepare_simulated(journal, supervisor.clone(), settings),
             None => {
                 let open_port = open_memory(socket.clone());
-                let gpio = Box::new(NoHostGpio);
                 let supervisor = supervisor.clone();
                 let resources = Resources { open_port, relocate, gpio, journal, supervisor };
                 daemon::prepare(resources, settings)

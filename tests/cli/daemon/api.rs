@@ -23,7 +23,7 @@ use sonard::{
 };
 use sonard_test_support::in_process::Daemon as InProcess;
 
-use super::{Daemon, clean_log, logs, schema::misfits};
+use super::{Daemon, clean_log, logs, schema::misfits, send_request};
 use crate::common::{run, stderr, wait_until};
 
 /// A scan of a quarter turn that takes a second.
@@ -39,7 +39,7 @@ fn responses_match_the_openapi() {
     let playground = format!("server.playground={}", folder.path().display());
     let others = ["--set", "fleet.daemons=/nowhere/at/all"];
     let further = [&SHORT[..], &["--set", &playground], &others].concat();
-    let daemon = Daemon::start_mock(folder.path(), &further);
+    let daemon = InProcess::start_mock(folder.path(), &further);
     let document = daemon.get("/v1/openapi.json").json();
     assert_eq!(document["openapi"], "3.1.0");
     daemon.wait_for("ready");
@@ -87,7 +87,10 @@ fn responses_match_the_openapi() {
             } else {
                 body.map_or_else(String::new, Value::to_string)
             };
-            let reply = daemon.send(&method.to_ascii_uppercase(), &path, &text);
+            // Through the server: a WebSocket needs a connection.
+            let headers = [("Host", "localhost"), ("Content-Type", "application/json")];
+            let (method, connection) = (method.to_ascii_uppercase(), daemon.connect());
+            let reply = send_request(connection, &method, &path, &headers, &text);
             let content = content(reply.status);
             assert!(
                 content.is_object(),
@@ -114,7 +117,15 @@ fn responses_match_the_openapi() {
     assert_eq!(daemon.get("/v1/scans").status, 200);
     let figures = String::from_utf8(daemon.get("/metrics").body).expect("text");
     assert!(figures.contains("\nsonard_simulated 1"), "a mock measures nothing: {figures}");
-    // Rejections follow the document, too.
+    daemon.stop();
+}
+
+#[test]
+fn rejections_match_the_openapi() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = InProcess::start_mock(folder.path(), &SHORT);
+    let document = daemon.get("/v1/openapi.json").json();
+    daemon.wait_for("ready");
     for (method, path, body, status) in [
         ("GET", "/v1/nothing", "", 404),
         ("GET", "/v1/logs/..%2F..%2Fetc%2Fpasswd", "", 404),
@@ -156,7 +167,7 @@ fn responses_match_the_openapi() {
         let faults = misfits(&problem["application/json"]["schema"], &document, &reply.json());
         assert_eq!(faults, Vec::<String>::new(), "{method} {path}");
     }
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
 }
 
 /// Answers deserialize into the client's types without loss.
@@ -201,11 +212,11 @@ fn responses_deserialize() {
 }
 
 /// Both forms of a stream follow the document.
-fn check_stream(daemon: &Daemon, path: &str, content: &Value, document: &Value) {
+fn check_stream(daemon: &InProcess, path: &str, content: &Value, document: &Value) {
     for (format, media, prefix) in
         [("ndjson", "application/x-ndjson", ""), ("sse", "text/event-stream", "data: ")]
     {
-        let mut stream = daemon.connect().expect("it listens");
+        let mut stream = daemon.connect();
         // A reading with its annotations is the record with most fields.
         let (verdicts, kind) = if path == "/v1/live/records" {
             ("&verdicts=true", json!("ping"))

@@ -9,22 +9,11 @@ use std::{
     time::Duration,
 };
 
-use sonard::{
-    acoustics::Sensor,
-    api::{LinkState, Trouble},
-    config::{Keys, Mode},
-    daemon::{Handle, Journal, OptionalOutputs, Order, QueuedScans, Resources, Settings, prepare},
-    host_gpio::HostGpio,
-    link,
-    mock::Pace,
-    scene::parse_pose,
-    supervisor::Supervisor,
-};
-use tokio::runtime::Runtime;
-use tokio_util::sync::CancellationToken;
+use serde_json::Value;
+use sonard::host_gpio::HostGpio;
+use sonard_test_support::in_process::Daemon;
 
-use super::{clean_log, rig::Rig};
-use crate::common::wait_until;
+use super::clean_log;
 
 #[derive(Default)]
 struct Switches {
@@ -58,66 +47,73 @@ impl HostGpio for Switchboard {
     }
 }
 
-fn settings(port: String) -> Settings {
-    let mut keys = Keys::default();
-    keys.device.port = Some(port);
-    keys.scanning.mode = Mode::Continuous;
-    keys.model.options.max_range_m = Some(2.0);
-    keys.link.attempts = 2;
-    (keys.link.retry_min_s, keys.link.retry_max_s) = (0.05, 0.3);
-    let sensor = Sensor::preset("senscomp-6500").expect("a preset");
-    let pose = parse_pose("0,0,0").expect("a pose");
-    let outputs = OptionalOutputs { mqtt: false, ros: false };
-    Settings {
-        keys,
-        scene: None,
-        sensor,
-        pose,
-        simulated: None,
-        outputs,
-        files: Default::default(),
-    }
+const OPTIONS: [&str; 10] = [
+    "--set",
+    "scanning.mode=continuous",
+    "--set",
+    "model.max_range_m=2",
+    "--set",
+    "link.attempts=2",
+    "--set",
+    "link.retry_min_s=0.05",
+    "--set",
+    "link.retry_max_s=0.3",
+];
+
+/// Starts a daemon whose pins are switches.
+fn start(folder: &Path, further: &[&str]) -> (Daemon, Arc<Switches>) {
+    let switches = Arc::new(Switches::default());
+    let gpio = Box::new(Switchboard(Arc::clone(&switches)));
+    (Daemon::start_with_gpio(folder, gpio, &[&OPTIONS, further].concat()), switches)
 }
 
-/// Runs a daemon with pins made of switches while `act` goes on. Returns the switches as the daemon left them.
-fn run(
-    settings: Settings,
-    folder: &Path,
-    act: impl FnOnce(&Runtime, &Handle, &Switches),
-) -> Arc<Switches> {
-    let switches = Arc::new(Switches::default());
-    let runtime = Runtime::new().expect("threads");
-    let supervisor = Supervisor::default();
-    let context = runtime.enter();
-    let opened = Journal::open(&folder.join("log"), settings.rotation(), &supervisor);
-    let (journal, thread) = opened.expect("a log");
-    let gpio = Box::new(Switchboard(Arc::clone(&switches)));
-    let resources = Resources {
-        open_port: Box::new(|port| Ok(Box::new(link::open(port)?))),
-        relocate: None,
-        gpio,
-        journal,
-        supervisor,
-    };
-    let stop = CancellationToken::new();
-    let (daemon, handle) = prepare(resources, settings);
-    drop(context);
-    let running = runtime.spawn(daemon.run(stop.clone().cancelled_owned()));
-    act(&runtime, &handle, &switches);
-    stop.cancel();
-    runtime.block_on(running).expect("it ends").expect("no task failed");
-    assert_eq!(thread.close().error, None);
-    switches
+fn wait_for_beams(daemon: &Daemon) {
+    daemon.wait_until("beams", || daemon.status()["scan"]["done"].as_u64() >= Some(3));
+}
+
+fn beams(daemon: &Daemon) -> Value {
+    daemon.health()["scans"]["beams"].clone()
 }
 
 #[test]
 fn host_pins() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut rig = Rig::new(folder.path(), Pace::RealTime);
-    let settings = settings(folder.path().join("ranger").display().to_string());
-    let switches = run(settings, folder.path(), |runtime, handle, switches| {
-        play(&mut rig, runtime, handle, switches);
-    });
+    let (mut daemon, switches) = start(folder.path(), &[]);
+    // Each byte is lost: the board never replies.
+    daemon.plug("drop=1", 1);
+    daemon.wait_until("resets", || switches.resets.load(SeqCst) >= 2);
+    switches.home_open.store(true, SeqCst);
+    daemon.plug("", 1);
+    daemon.wait_for("fault");
+    switches.home_open.store(false, SeqCst);
+    wait_for_beams(&daemon);
+    assert!(switches.power.load(SeqCst) && switches.light.load(SeqCst));
+
+    switches.pressed.store(true, SeqCst);
+    daemon.wait_for("emergency_stop");
+    daemon.wait_until("no power", || !switches.power.load(SeqCst) && !switches.light.load(SeqCst));
+    let before = beams(&daemon);
+    daemon.pass(Duration::from_millis(400));
+    assert_eq!(daemon.status()["link"]["state"], "emergency_stop");
+    assert_eq!(beams(&daemon), before);
+    let refused = daemon.send("POST", "/v1/start", "{}");
+    assert_eq!(refused.status, 409);
+    let error = refused.json()["error"].clone();
+    assert!(error.as_str().is_some_and(|error| error.contains("emergency stop")), "{error}");
+    // After the release it waits for a start request.
+    switches.pressed.store(false, SeqCst);
+    daemon.wait_for("awaiting_start");
+    let error = daemon.status()["link"]["error"].clone();
+    assert!(error.as_str().is_some_and(|error| error.contains("/v1/start")), "{error}");
+    daemon.pass(Duration::from_millis(400));
+    assert_eq!(daemon.status()["link"]["state"], "awaiting_start");
+    assert_eq!(beams(&daemon), before);
+    assert!(!switches.power.load(SeqCst));
+    assert_eq!(daemon.send("POST", "/v1/start", "{}").status, 202);
+    wait_for_beams(&daemon);
+    assert!(switches.power.load(SeqCst));
+
+    daemon.stop();
     assert!(!switches.power.load(SeqCst) && !switches.light.load(SeqCst), "off at the end");
     let events = clean_log(folder.path()).events();
     for part in ["emergency stop was pressed", "emergency stop was released", "home switch is open"]
@@ -126,62 +122,17 @@ fn host_pins() {
     }
 }
 
-fn play(rig: &mut Rig, runtime: &Runtime, daemon: &Handle, switches: &Switches) {
-    let state = || daemon.status().link.state;
-    let scans = |beams| {
-        wait_until("beams", || daemon.status().scan.is_some_and(|scan| scan.done >= beams));
-    };
-    let silent = rig.plug_silent();
-    wait_until("resets", || switches.resets.load(SeqCst) >= 2);
-    drop(silent);
-    switches.home_open.store(true, SeqCst);
-    rig.plug("", 1);
-    wait_until("the fault", || state() == LinkState::Down(Trouble::Fault));
-    switches.home_open.store(false, SeqCst);
-    scans(3);
-    assert!(switches.power.load(SeqCst) && switches.light.load(SeqCst));
-
-    switches.pressed.store(true, SeqCst);
-    wait_until("the stop", || state() == LinkState::EmergencyStop);
-    wait_until("no power", || !switches.power.load(SeqCst) && !switches.light.load(SeqCst));
-    let beams = daemon.health().scans.beams;
-    std::thread::sleep(Duration::from_millis(400));
-    assert_eq!((state(), daemon.health().scans.beams), (LinkState::EmergencyStop, beams));
-    let refused = runtime.block_on(daemon.order(start()));
-    assert!(refused.is_err_and(|refusal| refusal.message.contains("emergency stop")));
-    // After the release it waits for a start request.
-    switches.pressed.store(false, SeqCst);
-    wait_until("the release", || state() == LinkState::AwaitingStart);
-    let trouble = daemon.status().link.error;
-    assert!(trouble.is_some_and(|trouble| trouble.contains("/v1/start")));
-    std::thread::sleep(Duration::from_millis(400));
-    assert_eq!((state(), daemon.health().scans.beams), (LinkState::AwaitingStart, beams));
-    assert!(!switches.power.load(SeqCst));
-    runtime.block_on(daemon.order(start())).expect("it begins");
-    scans(3);
-    assert!(switches.power.load(SeqCst));
-}
-
-fn start() -> Order {
-    let request = uuid::Uuid::new_v4();
-    Order::Start(QueuedScans { request, scans: None, plan: None, pose: None })
-}
-
 #[test]
 fn automatic_resume_after_stop() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut rig = Rig::new(folder.path(), Pace::RealTime);
-    rig.plug("", 1);
-    let mut settings = settings(folder.path().join("ranger").display().to_string());
-    settings.keys.safety.resume_after_emergency_stop = true;
-    run(settings, folder.path(), |_, handle, switches| {
-        let scans = || {
-            wait_until("beams", || handle.status().scan.is_some_and(|scan| scan.done >= 3));
-        };
-        scans();
-        switches.pressed.store(true, SeqCst);
-        wait_until("the stop", || handle.status().link.state == LinkState::EmergencyStop);
-        switches.pressed.store(false, SeqCst);
-        scans();
-    });
+    let resume = ["--set", "safety.resume_after_emergency_stop=true"];
+    let (mut daemon, switches) = start(folder.path(), &resume);
+    daemon.plug("", 1);
+    wait_for_beams(&daemon);
+    switches.pressed.store(true, SeqCst);
+    daemon.wait_for("emergency_stop");
+    switches.pressed.store(false, SeqCst);
+    daemon.wait_until("the release", || daemon.status()["link"]["state"] != "emergency_stop");
+    wait_for_beams(&daemon);
+    daemon.stop();
 }

@@ -6,12 +6,12 @@ use std::{
     fs,
     io::{BufRead as _, BufReader, Write as _},
     path::Path,
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use jiff::Timestamp;
 use serde_json::{Value, json};
-use sonard_test_support::in_process::Daemon as InProcess;
+use sonard_test_support::in_process::{Connection, Daemon as InProcess};
 
 use super::{Daemon, clean_log, logs};
 use crate::common::{Log, run, sonard, stderr, wait_until};
@@ -34,29 +34,40 @@ fn start_stationary(folder: &Path, further: &[&str]) -> Daemon {
     start(folder, &[&["--pose", "3,1.2,20"], further].concat())
 }
 
-/// Returns the records that a subscriber receives within some seconds, with their times.
-fn listen(daemon: &Daemon, path: &str, seconds: f64) -> Vec<(Timestamp, Value)> {
-    let mut stream = daemon.connect().expect("it listens");
-    stream.set_read_timeout(Some(Duration::from_millis(100))).expect("a socket");
-    let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n");
-    stream.write_all(request.as_bytes()).expect("it listens");
-    let (until, mut reported) = (Instant::now() + Duration::from_secs_f64(seconds), Vec::new());
-    let (mut reader, mut line) = (BufReader::new(stream), Vec::new());
-    while Instant::now() < until {
-        // A read that times out keeps what it has read.
-        if reader.read_until(b'\n', &mut line).is_ok_and(|count| count > 0) {
-            let now = Timestamp::now();
-            if let Ok(record @ Value::Object(_)) = serde_json::from_slice::<Value>(&line) {
-                reported.push((now, record));
-            }
-            line.clear();
-        }
+/// Subscriber of a stream of records.
+struct Subscriber(BufReader<Connection>);
+
+impl Subscriber {
+    fn new(daemon: &InProcess, path: &str) -> Self {
+        let mut stream = daemon.connect();
+        stream.set_read_timeout(Duration::from_millis(100));
+        let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n");
+        stream.write_all(request.as_bytes()).expect("it listens");
+        Self(BufReader::new(stream))
     }
-    reported
+
+    /// Records received within some seconds of simulated time.
+    fn receive_for(&mut self, seconds: f64) -> Vec<Value> {
+        let until = self.0.get_ref().now() + Duration::from_secs_f64(seconds);
+        let (mut received, mut line) = (Vec::new(), Vec::new());
+        while self.0.get_ref().now() < until {
+            // A read that times out keeps what it has read.
+            if self.0.read_until(b'\n', &mut line).is_ok_and(|count| count > 0) {
+                received.extend(serde_json::from_slice(&line).ok().filter(Value::is_object));
+                line.clear();
+            }
+        }
+        received
+    }
 }
 
-fn pings(reported: &[(Timestamp, Value)]) -> Vec<(Timestamp, &Value)> {
-    reported.iter().filter(|(_, record)| record["type"] == "ping").map(|(at, r)| (*at, r)).collect()
+/// Records that a new subscriber receives within some seconds of simulated time.
+fn receive_for(daemon: &InProcess, path: &str, seconds: f64) -> Vec<Value> {
+    Subscriber::new(daemon, path).receive_for(seconds)
+}
+
+fn pings(received: &[Value]) -> Vec<&Value> {
+    received.iter().filter(|record| record["type"] == "ping").collect()
 }
 
 /// Returns the readings of `sonard simulate` at a pose: status and range by ranger.
@@ -78,27 +89,25 @@ fn reported(daemon: &InProcess) -> Vec<(Value, Value)> {
 #[test]
 fn records_are_marked_simulated() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = start_stationary(folder.path(), &[]);
+    let daemon = in_process(folder.path(), &["--pose", "3,1.2,20"], &[]);
     daemon.wait_for_scans(1);
-    let reported = listen(&daemon, "/v1/live/records", 2.0);
-    for (_, record) in &reported {
+    let received = receive_for(&daemon, "/v1/live/records", 2.0);
+    for record in &received {
         assert_eq!(record["provenance"], "simulated", "{record}");
     }
-    let pings = pings(&reported);
+    let pings = pings(&received);
     let fired: Vec<Timestamp> = pings
         .iter()
-        .map(|(_, ping)| ping["time"].as_str().and_then(|t| t.parse().ok()).expect("a time"))
+        .map(|ping| ping["time"].as_str().and_then(|time| time.parse().ok()).expect("a time"))
         .collect();
-    let first = IDS.iter().position(|id| pings[0].1["ranger"] == *id).expect("a ranger");
-    for (at, (_, ping)) in pings.iter().enumerate() {
+    let first = IDS.iter().position(|id| pings[0]["ranger"] == *id).expect("a ranger");
+    for (at, ping) in pings.iter().enumerate() {
         assert_eq!(ping["ranger"], IDS[(first + at) % 8], "in turn");
     }
     assert!(fired.is_sorted(), "one after the other");
 
-    // For people, too.
-    let socket = folder.path().join("s");
-    let status = run(&["status", "--socket", socket.to_str().expect("plain path")]);
-    assert_eq!(status.status.code(), Some(0));
+    let status = daemon.run_client("status");
+    assert_eq!(status.status.code(), Some(0), "{}", stderr(&status));
     let printed = String::from_utf8_lossy(&status.stdout).into_owned();
     assert!(
         printed.contains("SIMULATED") && printed.contains("pioneer-8, one ranger every 40"),
@@ -107,7 +116,7 @@ fn records_are_marked_simulated() {
     let metrics = String::from_utf8(daemon.get("/metrics").body).expect("text");
     assert!(metrics.contains("sonard_simulated 1"), "{metrics}");
     assert!(daemon.status()["device"].is_null() && daemon.status()["link"]["port"] == "");
-    assert_eq!(daemon.stop(), Some(0));
+    daemon.stop();
     let log = clean_log(folder.path());
     assert_eq!(log.of_type("session").count(), 1);
     let session = log.of_type("session").next().expect("a session");
@@ -153,26 +162,36 @@ fn readings_after_a_pose_change() {
 #[test]
 fn deadband_of_subscribers() {
     let folder = tempfile::tempdir().expect("a folder");
-    let daemon = start_stationary(folder.path(), &[]);
+    let daemon = in_process(folder.path(), &["--pose", "3,1.2,20"], &[]);
     daemon.wait_for_scans(1);
-    let quiet = listen(&daemon, "/v1/live/records?moved_m=0.05", 2.0);
-    assert_eq!(pings(&quiet).len(), 8, "each ranger once, then nothing: the robot is stationary");
-    let every = listen(&daemon, "/v1/live/records", 2.0);
+    let quiet = receive_for(&daemon, "/v1/live/records?moved_m=0.05", 2.0);
+    assert_eq!(pings(&quiet).len(), 8, "each ranger once: the robot is stationary");
+    let every = receive_for(&daemon, "/v1/live/records", 2.0);
     assert!(pings(&every).len() > 24, "{}", pings(&every).len());
-    let mover = std::thread::scope(|scope| {
-        let watching = scope.spawn(|| listen(&daemon, "/v1/live/records?moved_m=0.05", 3.0));
-        std::thread::sleep(Duration::from_millis(1200));
-        let body = r#"{"x_m":3.3,"y_m":1.2,"heading_deg":20}"#;
-        assert_eq!(daemon.send("PUT", "/v1/pose", body).status, 202);
-        watching.join().expect("no panic")
-    });
-    let count = pings(&mover).len();
-    assert!((9..=16).contains(&count), "{count}: each once, and what the move changed");
+    let mut subscriber = Subscriber::new(&daemon, "/v1/live/records?moved_m=0.05");
+    assert_eq!(pings(&subscriber.receive_for(1.2)).len(), 8);
+    let body = r#"{"x_m":3.3,"y_m":1.2,"heading_deg":20}"#;
+    assert_eq!(daemon.send("PUT", "/v1/pose", body).status, 202);
+    let moved = subscriber.receive_for(1.8);
+    let count = pings(&moved).len();
+    assert!((1..=8).contains(&count), "{count}: what the move changed, once");
     // A whole round is a message, too.
-    let rounds = listen(&daemon, "/v1/live/scans", 1.5);
-    assert!(rounds.iter().all(|(_, scan)| scan["pings"].as_array().map(Vec::len) == Some(8)));
+    let mut subscriber = Subscriber::new(&daemon, "/v1/live/scans");
+    let completed = || daemon.health()["scans"]["completed"].as_u64();
+    let before = completed();
+    let mut rounds = Vec::new();
+    while rounds.len() < 2 && completed() < before.map(|count| count + 200) {
+        rounds.extend(subscriber.receive_for(0.5));
+    }
+    assert!(rounds.iter().all(|scan| scan["pings"].as_array().map(Vec::len) == Some(8)));
     assert!(rounds.len() >= 2, "{}", rounds.len());
-    // And for people.
+    daemon.stop();
+}
+
+#[test]
+fn watch_prints_simulated_readings() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let daemon = start_stationary(folder.path(), &[]);
     let socket = folder.path().join("s").display().to_string();
     let mut watch = sonard(&["watch", "--socket", &socket]);
     let mut child = watch.stdout(std::process::Stdio::piped()).spawn().expect("starts");

@@ -22,6 +22,7 @@ use http_body_util::BodyExt as _;
 use serde_json::Value;
 use sonard::{
     cli::EmbeddedDaemon,
+    host_gpio::{HostGpio, NoHostGpio},
     messages,
     mock::{MockPort, Pace},
     server::Peer,
@@ -75,12 +76,24 @@ impl Daemon {
     /// # Panics
     /// If the options are wrong.
     pub fn start_at_level(level: &str, folder: &Path, options: &[&str]) -> Self {
+        Self::start_with(level, folder, Box::new(NoHostGpio), options)
+    }
+
+    /// Starts a daemon with pins of the host.
+    ///
+    /// # Panics
+    /// If the options are wrong.
+    pub fn start_with_gpio(folder: &Path, gpio: Box<dyn HostGpio>, options: &[&str]) -> Self {
+        Self::start_with("info", folder, gpio, options)
+    }
+
+    fn start_with(level: &str, folder: &Path, gpio: Box<dyn HostGpio>, options: &[&str]) -> Self {
         let messages = MessageBuffer::default();
         let executor = Rc::new(Executor::new(level, messages.clone()));
         let log = folder.join("log");
         let log = ["--log", log.to_str().expect("plain path")];
         let prepared =
-            executor.block_on(async { EmbeddedDaemon::from_options(&[&log, options].concat()) });
+            executor.block_on(async { EmbeddedDaemon::with_gpio(&[&log, options].concat(), gpio) });
         let (control, work) =
             prepared.unwrap_or_else(|failure| panic!("the daemon starts: {failure:?}"));
         let running = executor.runtime.spawn(work);

@@ -10,7 +10,7 @@ use super::{Client, ClientError};
 
 /// Timeout of a live stream without data. The daemon sends an empty line or a comment at least
 /// every 15 s.
-pub(super) const IDLE_TIMEOUT: Duration = Duration::from_secs(40);
+pub const IDLE_TIMEOUT: Duration = Duration::from_secs(40);
 /// Additional time for a first read after the timeout: a client that was itself suspended finds the
 /// deadline passed although data are pending.
 const GRACE: Duration = Duration::from_secs(1);
