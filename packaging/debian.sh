@@ -9,7 +9,7 @@ new_debian() {
 
 # Downloads are kept for a week under target/tools, because fetching takes a minute; `kept_debian` prints the folder.
 keep_debian() {
-  local suite packages=systemd,dbus,udev,procps,curl
+  local suite packages=systemd,dbus,udev,procps,curl,xz-utils
   command -v mmdebstrap >/dev/null || tests/install.sh "" mmdebstrap
   suite=$(. /etc/os-release && echo "$VERSION_CODENAME")
   kept_debian=${CARGO_TARGET_DIR:-target}/tools/debian-$suite-${packages//,/-}.tar

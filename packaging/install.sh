@@ -5,7 +5,8 @@
 #   sh install.sh --prefix FOLDER      installation folder [default: ~/.local]
 #   sh install.sh --uninstall          removes what was installed
 #
-# The archive is selected by system, processor and C library, and its SHA-256 digest is verified before unpacking.
+# The archive is selected by system, processor and C library, and its SHA-256 digest is verified before unpacking. The
+# smaller archive, .tar.xz, is taken where the program xz unpacks it.
 set -eu
 version=@VERSION@
 # Oldest glibc of the programs that are linked against it.
@@ -19,7 +20,7 @@ while [ $# != 0 ]; do
   --from) from=${2:?--from: where?} && shift 2 ;;
   --prefix) prefix=${2:?--prefix: where?} && shift 2 ;;
   --uninstall) action=uninstall && shift ;;
-  -h | --help) sed -n '2,8s/^# \{0,1\}//p' "$0" && exit ;;
+  -h | --help) sed -n '2,9s/^# \{0,1\}//p' "$0" && exit ;;
   *) fail "unknown option $1" ;;
   esac
 done
@@ -68,16 +69,27 @@ target() {
   printf '%s-unknown-linux-%s' "$processor" "$library"
 }
 
+# fetch_verified ARCHIVE: copies an archive of the release, and verifies its digest.
+fetch_verified() {
+  fetch "$1" "$work/$1"
+  expected=$(sed -n "s/  $1\$//p" "$work/SHA256SUMS")
+  found=$(sha256sum "$work/$1")
+  [ -n "$expected" ] && [ "${found%% *}" = "$expected" ] || fail "the digest of $1 is not that of SHA256SUMS"
+}
+
 install() {
   work=$(mktemp -d)
   trap 'rm -rf "$work"' EXIT
   fetch SHA256SUMS "$work/SHA256SUMS"
   name=sonard-$version-$(target)
-  fetch "$name.tar.gz" "$work/$name.tar.gz"
-  expected=$(sed -n "s/  $name\\.tar\\.gz\$//p" "$work/SHA256SUMS")
-  found=$(sha256sum "$work/$name.tar.gz")
-  [ -n "$expected" ] && [ "${found%% *}" = "$expected" ] || fail "the digest of $name.tar.gz is not that of SHA256SUMS"
-  tar -x -z -f "$work/$name.tar.gz" -C "$work"
+  # Some systems have an xz without the filter for machine code.
+  if grep -q -- "  $name.tar.xz\$" "$work/SHA256SUMS" && command -v xz >/dev/null &&
+    fetch_verified "$name.tar.xz" && xz -d "$work/$name.tar.xz" 2>/dev/null; then
+    tar -x -f "$work/$name.tar" -C "$work"
+  else
+    fetch_verified "$name.tar.gz"
+    tar -x -z -f "$work/$name.tar.gz" -C "$work"
+  fi
   if [ -r "$list" ]; then
     uninstall
   elif [ -e "$prefix/bin/sonard" ]; then

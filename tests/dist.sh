@@ -54,7 +54,7 @@ try_installer() {
   cp -r "$dist" "$root/dist"
   chroot "$root" useradd --create-home user
   chroot "$root" find /home/user | sort >"$work/before"
-  archive=$(find "$dist" -name "*-$machine-unknown-linux-gnu.tar.gz")
+  archive=$(find "$dist" -name "*-$machine-unknown-linux-gnu.tar.xz")
   cat >"$root/first.sh" <<END
 set -eu
 cd && export HOME=\$PWD
@@ -73,8 +73,22 @@ END
     if as_user sh /dist/install.sh "$@" >"$work/output" 2>&1; then fail "install.sh $* succeeds"; fi
     grep -q -- "$part" "$work/output" || fail "install.sh $*: $(cat "$work/output")"
   }
-  as_user sh /dist/install.sh >/dev/null
-  as_user /home/user/.local/bin/sonard --version >/dev/null || fail "a second installation breaks the first"
+  # installs_from SUFFIX: with only that archive at hand, a second installation leaves a program that runs.
+  installs_from() {
+    rm "$root"/dist/*.tar.?z
+    cp "$dist/$(basename "$archive" .xz).$1" "$root/dist"
+    as_user sh /dist/install.sh >"$work/output" 2>&1 || fail "install.sh with .$1 only: $(cat "$work/output")"
+    as_user /home/user/.local/bin/sonard --version >/dev/null || fail "a second installation breaks the first"
+  }
+  installs_from xz
+  # Without xz, or with one that lacks a filter, the other archive is unpacked.
+  mv "$root/usr/bin/xz" "$root/usr/bin/xz.away"
+  installs_from gz
+  printf '#!/bin/sh\nexit 1\n' >"$root/usr/bin/xz"
+  chmod +x "$root/usr/bin/xz"
+  cp "$archive" "$root/dist"
+  as_user sh /dist/install.sh >"$work/output" 2>&1 || fail "install.sh with a broken xz: $(cat "$work/output")"
+  mv "$root/usr/bin/xz.away" "$root/usr/bin/xz"
   rejects 'no SHA256SUMS' --from /nowhere
   rejects 'not writable' --prefix /opt
   rejects 'nothing is installed' --prefix /opt --uninstall
@@ -83,21 +97,44 @@ END
   rejects 'not from this script' --prefix /other
   as_user sh -c 'rm -r "$HOME/out" && sh /dist/install.sh --uninstall && rmdir "$HOME/.local" 2>/dev/null || true'
   chroot "$root" find /home/user | sort | diff "$work/before" - || fail "uninstalling leaves files"
-  # A changed archive is rejected.
-  printf x >>"$root/dist/$(basename "$archive")"
-  rejects 'digest' --from /dist
+  # A changed archive is rejected, and leaves nothing.
+  local suffix
+  for suffix in xz gz; do
+    rm -f "$root"/dist/*.tar.?z
+    cp "$dist/$(basename "$archive" .xz).$suffix" "$root/dist"
+    printf x >>"$root/dist/$(basename "$archive" .xz).$suffix"
+    if [ "$suffix" = gz ]; then rm "$root/usr/bin/xz"; fi
+    rejects 'digest' --from /dist
+    chroot "$root" find /home/user | sort | diff "$work/before" - || fail "a rejected archive leaves files"
+  done
 }
 
-# A root with nothing but the static program.
+# A root without a C library: busybox, and what is installed there.
 try_static() {
-  local platform="no C library, no shell, $machine" archive root=$work/static
-  archive=$(find "$dist" -name "*-$machine-unknown-linux-musl.tar.gz")
+  local platform="busybox without C library, $machine" archive root=$work/static busybox
+  archive=$(find "$dist" -name "*-$machine-unknown-linux-musl.tar.xz")
   if [ -z "$archive" ]; then leave_out "$platform" "no static program is built"; return; fi
-  mkdir -p "$root/dev" "$root/tmp"
-  tar --extract --file "$archive" --directory "$root" --strip-components 2 --wildcards '*/bin/sonard'
-  timed within "$root" /sonard "${scan[@]}"
-  [ -s "$root/out/fig9/scan.png" ] || fail "no picture: $(cat "$work/output")"
-  row "$platform" "the program alone" "$took" "$(megabytes "$archive")" no
+  busybox=$(command -v busybox) || { tests/install.sh "" busybox-static && busybox=$(command -v busybox); }
+  if ldd "$busybox" >/dev/null 2>&1; then leave_out "$platform" "the busybox here is not static"; return; fi
+  mkdir -p "$root/bin" "$root/dev" "$root/tmp" "$root/home"
+  cp "$busybox" "$root/bin/busybox"
+  chroot "$root" /bin/busybox --install -s /bin
+  mknod -m 666 "$root/dev/null" c 1 3
+  cp -r "$dist" "$root/dist"
+  find "$root/home" | sort >"$work/before"
+  cat >"$root/first.sh" <<END
+set -eu
+export HOME=/home PATH=/home/.local/bin:/bin
+cd /home
+sh /dist/install.sh
+sonard ${scan[*]}
+END
+  timed within "$root" /bin/sh /first.sh
+  [ -s "$root/home/out/fig9/scan.png" ] || fail "no picture: $(cat "$work/output")"
+  row "$platform" "install.sh, then the first scan" "$took" "$(megabytes "$archive")" no
+  chroot "$root" /bin/env HOME=/home PATH=/bin sh -c 'rm -r /home/out && sh /dist/install.sh --uninstall'
+  rmdir "$root/home/.local" 2>/dev/null || true
+  find "$root/home" | sort | diff "$work/before" - || fail "uninstalling leaves files"
 }
 
 # A fresh environment of Python that takes packages from a folder.
@@ -127,7 +164,7 @@ END
 # In qemu-user 7.2 verbs with threads hang; the scan's row appears where it does not.
 try_aarch64() {
   local platform="aarch64 in qemu-user" archive
-  archive=$(find "$dist" -name "*-aarch64-unknown-linux-musl.tar.gz")
+  archive=$(find "$dist" -name "*-aarch64-unknown-linux-musl.tar.xz")
   if [ -z "$archive" ]; then leave_out "$platform" "no program for aarch64 is built"; return; fi
   command -v qemu-aarch64 >/dev/null || tests/install.sh "" qemu-user
   mkdir "$work/aarch64"

@@ -2,7 +2,11 @@
 
 use std::fs;
 
-use crate::{Failure, archive, release::Release};
+use crate::{
+    Failure,
+    archive::{self, Contents, Format},
+    release::Release,
+};
 
 /// Files of the checkout, and their places in the archive.
 const DOCUMENTS: [(&str, &str); 5] = [
@@ -22,7 +26,7 @@ const PAGES: [(&str, &str); 5] = [
     ("completions/sonard.fish", "share/fish/vendor_completions.d/sonard.fish"),
 ];
 
-/// Builds the program for each target and packs it.
+/// Builds the program for each target and packs it in both formats.
 ///
 /// # Errors
 /// A failed build, or a file that can't be written.
@@ -37,8 +41,11 @@ pub(crate) fn pack_all(release: &Release) -> Result<(), Failure> {
         for (from, to) in documents.into_iter().chain(pages).chain([(program, "bin/sonard")]) {
             copy(&from, &folder.join(to))?;
         }
-        let archive = release.dist.join(format!("{name}.tar.gz"));
-        archive::pack(&folder, release.time_s, &archive)?;
+        let contents = if target.starts_with("x86_64") { Contents::X86 } else { Contents::Other };
+        for (suffix, format) in [("gz", Format::Gzip), ("xz", Format::Xz(contents))] {
+            let archive = release.dist.join(format!("{name}.tar.{suffix}"));
+            archive::pack(&folder, release.time_s, format, &archive)?;
+        }
     }
     Ok(())
 }

@@ -3,7 +3,8 @@
 use std::{fs, io::Write as _, process::Command};
 
 use crate::{
-    Failure, archive,
+    Failure,
+    archive::{self, Format},
     command::{read, run},
     release::Release,
 };
@@ -34,5 +35,5 @@ pub(crate) fn pack(release: &Release) -> Result<(), Failure> {
         fs::OpenOptions::new().append(true).open(folder.join(".cargo/config.toml"))?;
     write!(configuration, "\n{settings}\n")?;
     let archive = release.dist.join(format!("{name}.tar.gz"));
-    archive::pack(&folder, release.time_s, &archive)
+    archive::pack(&folder, release.time_s, Format::Gzip, &archive)
 }
