@@ -24,11 +24,21 @@ while [ $# != 0 ]; do
   *) fail "unknown option $1" ;;
   esac
 done
-case $prefix in /.local) fail "HOME is not set; name a folder: --prefix FOLDER" ;; esac
+case $prefix in
+/.local) fail "HOME is not set; name a folder: --prefix FOLDER" ;;
+/*) ;;
+*) prefix=$PWD/$prefix ;;
+esac
 list=$prefix/share/sonard/installed
 
-# Removes the files of the list, and the folders that are empty then.
 uninstall() {
+  remove_files
+  rmdir "$prefix" 2>/dev/null || true
+  printf 'removed sonard from %s\n' "$prefix"
+}
+
+# Removes the files of the list, and the folders that are empty then.
+remove_files() {
   [ -r "$list" ] || fail "nothing is installed in $prefix"
   while read -r file; do rm -f "$prefix/$file"; done <"$list"
   folders=$(while read -r file; do
@@ -91,7 +101,7 @@ install() {
     tar -x -z -f "$work/$name.tar.gz" -C "$work"
   fi
   if [ -r "$list" ]; then
-    uninstall
+    remove_files
   elif [ -e "$prefix/bin/sonard" ]; then
     fail "$prefix/bin/sonard is there, but not from this script: remove it, or name another folder by --prefix"
   fi

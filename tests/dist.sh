@@ -92,10 +92,14 @@ END
   rejects 'no SHA256SUMS' --from /nowhere
   rejects 'not writable' --prefix /opt
   rejects 'nothing is installed' --prefix /opt --uninstall
+  rejects 'is not writable' --prefix /etc/hostname
+  as_user sh -c 'cd && sh /dist/install.sh --prefix "other tools"' >"$work/output"
+  grep -q 'PATH="/home/user/other tools/bin:' "$work/output" || fail "a relative folder: $(cat "$work/output")"
+  as_user sh -c 'cd && sh /dist/install.sh --prefix "other tools" --uninstall' >/dev/null
   mkdir -p "$root/other/bin"
   touch "$root/other/bin/sonard"
   rejects 'not from this script' --prefix /other
-  as_user sh -c 'rm -r "$HOME/out" && sh /dist/install.sh --uninstall && rmdir "$HOME/.local" 2>/dev/null || true'
+  as_user sh -c 'rm -r "$HOME/out" && sh /dist/install.sh --uninstall' >/dev/null
   chroot "$root" find /home/user | sort | diff "$work/before" - || fail "uninstalling leaves files"
   # A changed archive is rejected, and leaves nothing.
   local suffix
@@ -132,8 +136,7 @@ END
   timed within "$root" /bin/sh /first.sh
   [ -s "$root/home/out/fig9/scan.png" ] || fail "no picture: $(cat "$work/output")"
   row "$platform" "install.sh, then the first scan" "$took" "$(megabytes "$archive")" no
-  chroot "$root" /bin/env HOME=/home PATH=/bin sh -c 'rm -r /home/out && sh /dist/install.sh --uninstall'
-  rmdir "$root/home/.local" 2>/dev/null || true
+  chroot "$root" /bin/env HOME=/home PATH=/bin sh -c 'rm -r /home/out && sh /dist/install.sh --uninstall' >/dev/null
   find "$root/home" | sort | diff "$work/before" - || fail "uninstalling leaves files"
 }
 
