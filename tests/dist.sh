@@ -113,6 +113,26 @@ END
   done
 }
 
+# Root installs the Debian package in a bare Debian, and purges it.
+try_package() {
+  local platform="Debian $(. /etc/os-release && echo "$VERSION_CODENAME"), $machine" package root=$work/package
+  package=$(find "$dist" -name "sonard_*_$(dpkg --print-architecture).deb")
+  if [ -z "$package" ]; then leave_out "$platform, package" "no package is built"; return; fi
+  new_debian "$root"
+  cp "$package" "$root/tmp/sonard.deb"
+  cat >"$root/first.sh" <<END
+set -eu
+dpkg --install /tmp/sonard.deb
+cd /tmp
+sonard ${scan[*]}
+END
+  timed within "$root" sh /first.sh
+  [ -s "$root/tmp/out/fig9/scan.png" ] || fail "no picture: $(cat "$work/output")"
+  row "$platform" "dpkg --install, then the first scan" "$took" "$(megabytes "$package")" yes
+  chroot "$root" dpkg --purge sonard >"$work/output" 2>&1 || fail "dpkg --purge: $(cat "$work/output")"
+  [ -z "$(find "$root/etc" "$root/usr" -name '*sonard*')" ] || fail "purging leaves $(find "$root/etc" "$root/usr" -name '*sonard*')"
+}
+
 # A root without a C library: busybox, and what is installed there.
 try_static() {
   local platform="busybox without C library, $machine" archive root=$work/static busybox
@@ -209,6 +229,7 @@ esac
 if [ -n "$is_release" ]; then look_for_traces; fi
 if [ "$(id -u)" = 0 ] && unshare --mount true 2>/dev/null; then
   try_installer
+  try_package
   try_static
 else
   leave_out "bare Debian, root with the program alone" "needs root and mounts"
