@@ -41,7 +41,9 @@ pub(crate) fn pack_all(release: &Release) -> Result<(), Failure> {
         for (from, to) in documents.into_iter().chain(pages).chain([(program, "bin/sonard")]) {
             copy(&from, &folder.join(to))?;
         }
-        let contents = if target.starts_with("x86_64") { Contents::X86 } else { Contents::Other };
+        // The xz of busybox, which systems with musl have, lacks the filter.
+        let is_filtered = *target == "x86_64-unknown-linux-gnu";
+        let contents = if is_filtered { Contents::X86 } else { Contents::Other };
         for (suffix, format) in [("gz", Format::Gzip), ("xz", Format::Xz(contents))] {
             let archive = release.dist.join(format!("{name}.tar.{suffix}"));
             archive::pack(&folder, release.time_s, format, &archive)?;
