@@ -228,10 +228,21 @@ impl LineArrangement {
             let nearest = (0..self.lines.len())
                 .min_by(|a, b| off(&self.lines[*a]).total_cmp(&off(&self.lines[*b])));
             let Some(line) = nearest else { continue };
-            let [s, t] = [segment.a, segment.b].map(|end| self.lines[line].along_m(end));
-            self.fill(&mut set, line, [s.min(t), s.max(t)]);
+            self.place(&mut set, &Segment { line, ..segment });
         }
         set
+    }
+
+    /// Walls on the lines of this arrangement.
+    pub(crate) fn of_segments(&self, segments: &[Segment]) -> PieceSet {
+        let mut set = PieceSet::new(self.pieces());
+        segments.iter().for_each(|segment| self.place(&mut set, segment));
+        set
+    }
+
+    fn place(&self, set: &mut PieceSet, segment: &Segment) {
+        let [s, t] = [segment.a, segment.b].map(|end| self.lines[segment.line].along_m(end));
+        self.fill(set, segment.line, [s.min(t), s.max(t)]);
     }
 
     /// Makes the inner pieces between two positions of a line walls.

@@ -15,6 +15,7 @@
 mod alternatives;
 mod arc;
 mod arrangement;
+mod boxes;
 mod bundle;
 mod candidates;
 mod course;

@@ -97,6 +97,13 @@ impl Move {
     }
 }
 
+/// Poses moved together so that the first is `start`.
+pub(crate) fn in_frame_of_first(poses: &[Pose], start: &Pose) -> Vec<Pose> {
+    let Some(first) = poses.first().filter(|first| *first != start) else { return poses.to_vec() };
+    let to = |pose: &Pose| Move::new(first, pose, OdometrySigma::default()).from(start);
+    poses.iter().map(to).collect()
+}
+
 fn in_frame(pose: &Pose, point: DVec2) -> DVec2 {
     DVec2::from_angle(-pose.heading_deg.to_radians()).rotate(point - pose.position())
 }

@@ -1,13 +1,12 @@
 //! Final estimate of poses and walls by the exact likelihood of all readings.
 
-use std::sync::Arc;
-
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use sonard_inverse::{ErrorModel, Hypotheses, LogLikelihood, Parameter};
 
 use crate::{
-    arc::quantile,
+    arc::{Arc, quantile},
+    arrangement::Segment,
     judge::Judge,
     normal::{NormalEquations, move_pose, pose_column},
     posed::{LineColumns, PosedPlan},
@@ -17,8 +16,11 @@ use crate::{
 const MAX_STEPS: usize = 6;
 /// Gain below which no further step is made, nats.
 const MIN_GAIN: f64 = 0.05;
-/// Scatter of the threshold from firing to firing, decibels.
+/// Scatter of the threshold from firing to firing before it is estimated, and choices, decibels.
 const SIGMA_DB: f64 = 1.0;
+const SPREADS_DB: [f64; 6] = [0.35, 0.5, 0.7, 1.0, 1.5, 2.5];
+/// Standard deviation of a normal distribution, in median absolute deviations.
+const PER_MEDIAN: f64 = 1.483;
 /// Limits of the standard deviation of ranges, metres.
 const SIGMA_M: [f64; 2] = [0.0005, 0.02];
 
@@ -28,17 +30,29 @@ struct Linearized {
     normal: NormalEquations,
 }
 
-/// Improves poses and the distances of lines by the likelihood of all readings: ranges, missing
-/// echoes and the ends of arcs. Directions of lines remain. Returns `None` if the normal equations
-/// have no solution.
-pub(crate) fn polish(posed: &mut PosedPlan, judge: &Judge) -> Option<()> {
-    let errors = error_model(posed, judge)?;
-    let mut best = linearize(posed, judge, &errors)?;
+/// Improves poses and lines by the likelihood of all readings: ranges, missing echoes and the ends
+/// of arcs. Directions are tied to a square axis with a standard deviation in radians, unless it is
+/// `None`. Returns `None` if the normal equations have no solution.
+pub(crate) fn polish(posed: &mut PosedPlan, judge: &Judge, square_rad: Option<f64>) -> Option<()> {
+    let rough = error_model(posed, judge)?;
+    climb(posed, judge, &rough, square_rad)?;
+    let errors = likeliest_spread(posed, judge, &error_model(posed, judge)?, square_rad)?;
+    climb(posed, judge, &errors, square_rad)
+}
+
+/// Maximizes the likelihood under an error model.
+fn climb(
+    posed: &mut PosedPlan,
+    judge: &Judge,
+    errors: &ErrorModel,
+    square_rad: Option<f64>,
+) -> Option<()> {
+    let mut best = linearize(posed, judge, errors, square_rad)?;
     let mut damping = 1e-3;
     for _ in 0..MAX_STEPS {
         let step = best.normal.step(damping)?;
         let tried = moved(posed, &step, judge);
-        let Some(at) = linearize(&tried, judge, &errors) else { break };
+        let Some(at) = linearize(&tried, judge, errors, square_rad) else { break };
         let gain = at.value - best.value;
         if gain <= 0.0 {
             damping *= 30.0;
@@ -52,21 +66,25 @@ pub(crate) fn polish(posed: &mut PosedPlan, judge: &Judge) -> Option<()> {
     Some(())
 }
 
+/// Error model with the scatter of the threshold that is most likely.
+fn likeliest_spread(
+    posed: &PosedPlan,
+    judge: &Judge,
+    errors: &ErrorModel,
+    square_rad: Option<f64>,
+) -> Option<ErrorModel> {
+    let of = |sigma_db: f64| ErrorModel { sigma_db, ..*errors };
+    let scored = SPREADS_DB.iter().filter_map(|&sigma_db| {
+        let errors = of(sigma_db);
+        Some((linearize(posed, judge, &errors, square_rad)?.value, errors))
+    });
+    scored.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, errors)| errors)
+}
+
 /// Error model with the observed scatter of ranges.
 fn error_model(posed: &PosedPlan, judge: &Judge) -> Option<ErrorModel> {
-    const GATE_M: f64 = 0.03;
-    /// Standard deviation of a normal distribution, in median absolute deviations.
-    const PER_MEDIAN: f64 = 1.483;
-    let own = judge.at_poses(&posed.poses);
-    let (_, predictions) = own.predictions(&posed.plan.segments(&posed.walls))?;
-    let mut errors_m = Vec::new();
-    for arc in judge.workspace.arcs.iter().flatten() {
-        let (readings, predictions) = (&own.readings()[arc.sweep], &predictions[arc.sweep]);
-        if let Some(explained) = explain(arc, readings, predictions, GATE_M, 0.5) {
-            let errors = explained.range_errors_m(readings, predictions);
-            errors_m.extend(errors.into_iter().map(f64::abs));
-        }
-    }
+    let mut errors_m: Vec<f64> = errors_by_arc(posed, judge)?.concat();
+    errors_m.iter_mut().for_each(|error_m| *error_m = error_m.abs());
     errors_m.sort_by(f64::total_cmp);
     let sigma_m = (PER_MEDIAN * quantile(&errors_m, 0.5)).clamp(SIGMA_M[0], SIGMA_M[1]);
     let reach_m = judge.workspace.reach_m();
@@ -74,14 +92,35 @@ fn error_model(posed: &PosedPlan, judge: &Judge) -> Option<ErrorModel> {
     Some(ErrorModel { outlier_share: 0.03, outlier_arc_share: 0.03, ..rough })
 }
 
+/// Measured minus predicted ranges of each explained arc, in order, metres.
+fn errors_by_arc(posed: &PosedPlan, judge: &Judge) -> Option<Vec<Vec<f64>>> {
+    const GATE_M: f64 = 0.03;
+    let own = judge.at_poses(&posed.poses);
+    let (_, predictions) = own.predictions(&posed.plan.segments(&posed.walls))?;
+    let of_arc = |arc: &Arc| {
+        let (readings, predictions) = (&own.readings()[arc.sweep], &predictions[arc.sweep]);
+        let explained = explain(arc, readings, predictions, GATE_M, 0.5)?;
+        let mut errors_m = explained.range_errors_m(readings, predictions);
+        errors_m.sort_by(f64::total_cmp);
+        Some(errors_m)
+    };
+    Some(judge.workspace.arcs.iter().flatten().filter_map(of_arc).collect())
+}
+
 /// Predicts all sweeps with their derivatives.
-fn linearize(posed: &PosedPlan, judge: &Judge, errors: &ErrorModel) -> Option<Linearized> {
+fn linearize(
+    posed: &PosedPlan,
+    judge: &Judge,
+    errors: &ErrorModel,
+    square_rad: Option<f64>,
+) -> Option<Linearized> {
     let workspace = judge.workspace;
     let segments = posed.plan.segments(&posed.walls);
     let mut world = workspace.world.clone();
-    world.scene = Arc::new(judge.scene_of(&segments));
+    world.scene = std::sync::Arc::new(judge.scene_of(&segments));
     let mut parameters = vec![Parameter::X(0), Parameter::Y(0), Parameter::Heading(0)];
     parameters.extend((0..segments.len()).map(Parameter::Wall));
+    parameters.extend((0..segments.len()).map(Parameter::WallTurn));
     let hypotheses = Hypotheses::new(world, parameters).ok()?;
     let of_sweep = |(sweep, pose)| hypotheses.log_likelihood(sweep, pose, errors).ok();
     let pairs = workspace.sweeps.par_iter().zip(&posed.poses);
@@ -91,13 +130,7 @@ fn linearize(posed: &PosedPlan, judge: &Judge, errors: &ErrorModel) -> Option<Li
     let mut value = 0.0;
     for (sweep, likelihood) in all?.iter().enumerate() {
         value += likelihood.value;
-        // Headings are in degrees there and in radians here. The normal of a wall points to its
-        // left, against that of its line.
-        let of_pose = [(0, 1.0), (1, 1.0), (2, 1f64.to_degrees())]
-            .map(|(offset, unit)| pose_column(sweep).map(|at| (at + offset, unit)));
-        let of_walls =
-            segments.iter().map(|wall| columns.of(wall.line).map(|column| (column + 1, -1.0)));
-        let map: Vec<Option<(usize, f64)>> = of_pose.into_iter().chain(of_walls).collect();
+        let map = parameter_columns(posed, &segments, &columns, sweep);
         add_mapped(&mut normal, &map, &likelihood.gradient, &likelihood.information);
     }
     for (at, step) in workspace.moves.iter().enumerate() {
@@ -106,26 +139,53 @@ fn linearize(posed: &PosedPlan, judge: &Judge, errors: &ErrorModel) -> Option<Li
             step.add_to(&mut normal, [from, to], [pose_column(at), pose_column(at + 1)]);
         }
     }
-    for column in columns.iter() {
-        // Directions are fixed.
-        normal.hold(column, 1e-9);
+    if let Some(sigma_rad) = square_rad {
+        let before = normal.loss();
+        columns.add_square(&mut normal, &posed.plan, sigma_rad);
+        value -= normal.loss() - before;
     }
     Some(Linearized { value, normal })
 }
 
-/// Adds a gradient and an information matrix whose parameters are multiples of columns.
+/// Derivatives of the parameters of a sweep (its pose, the offsets of all walls, their turns) by
+/// columns of the normal equations.
+///
+/// Headings and turns are in degrees there and in radians here. The normal of a wall points to its
+/// left, against that of its line, and a wall turns about its middle, a line about the foot of the
+/// origin.
+fn parameter_columns(
+    posed: &PosedPlan,
+    segments: &[Segment],
+    columns: &LineColumns,
+    sweep: usize,
+) -> Vec<Vec<(usize, f64)>> {
+    let to_deg = 1f64.to_degrees();
+    let of_pose = [(0, 1.0), (1, 1.0), (2, to_deg)]
+        .map(|(offset, unit)| pose_column(sweep).map(|at| (at + offset, unit)));
+    let offset = |wall: &Segment| {
+        let middle_m = posed.plan.lines[wall.line].along_m(wall.a.midpoint(wall.b));
+        columns.of(wall.line).map_or_else(Vec::new, |at| vec![(at, middle_m), (at + 1, -1.0)])
+    };
+    let turn = |wall: &Segment| columns.of(wall.line).map(|at| (at, to_deg));
+    let of_pose = of_pose.into_iter().map(|of| of.into_iter().collect());
+    let turns = segments.iter().map(|wall| turn(wall).into_iter().collect());
+    of_pose.chain(segments.iter().map(offset)).chain(turns).collect()
+}
+
+/// Adds a gradient and an information matrix whose parameters depend linearly on columns.
 fn add_mapped(
     normal: &mut NormalEquations,
-    map: &[Option<(usize, f64)>],
+    map: &[Vec<(usize, f64)>],
     gradient: &DVector<f64>,
     information: &DMatrix<f64>,
 ) {
     for (at, of) in map.iter().enumerate() {
-        let Some((row, unit)) = *of else { continue };
-        normal.add_gradient(row, unit * gradient[at]);
-        for (other, by) in map.iter().enumerate() {
-            if let Some((column, by)) = *by {
-                normal.add_information(row, column, unit * by * information[(at, other)]);
+        for &(row, unit) in of {
+            normal.add_gradient(row, unit * gradient[at]);
+            for (other, by) in map.iter().enumerate() {
+                for &(column, by) in by {
+                    normal.add_information(row, column, unit * by * information[(at, other)]);
+                }
             }
         }
     }
@@ -143,6 +203,7 @@ fn moved(posed: &PosedPlan, step: &DVector<f64>, judge: &Judge) -> PosedPlan {
     let mut lines = posed.plan.lines.clone();
     for (at, line) in lines.iter_mut().enumerate() {
         if let Some(column) = columns.of(at) {
+            line.normal_rad += step[column];
             line.distance_m += step[column + 1];
         }
         line.update_feet(&poses);

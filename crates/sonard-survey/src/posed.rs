@@ -2,7 +2,11 @@
 
 use sonard_model::geometry::Pose;
 
-use crate::arrangement::{LineArrangement, PieceSet};
+use crate::{
+    arrangement::{LineArrangement, PieceSet},
+    line::{off_square_rad, square_axis},
+    normal::NormalEquations,
+};
 
 /// Plan with its poses.
 #[derive(Debug, Clone)]
@@ -10,6 +14,14 @@ pub(crate) struct PosedPlan {
     pub(crate) plan: LineArrangement,
     pub(crate) walls: PieceSet,
     pub(crate) poses: Vec<Pose>,
+}
+
+impl PosedPlan {
+    /// Poses without lines and walls.
+    pub(crate) fn without_walls(poses: Vec<Pose>) -> Self {
+        let plan = LineArrangement::new(Vec::new(), &poses, 0.0);
+        Self { plan, walls: PieceSet::default(), poses }
+    }
 }
 
 /// Columns of the lines with walls in normal equations, after those of the poses: direction, then
@@ -51,5 +63,26 @@ impl LineColumns {
     /// Columns of all directions.
     pub(crate) fn iter(&self) -> impl Iterator<Item = usize> + '_ {
         self.lines.iter().flatten().copied()
+    }
+    /// Ties the directions of lines to their common square axis, with a standard deviation in
+    /// radians.
+    pub(crate) fn add_square(
+        &self,
+        normal: &mut NormalEquations,
+        plan: &LineArrangement,
+        sigma_rad: f64,
+    ) {
+        const MAX_OFF_RAD: f64 = 0.12;
+        let used = plan.lines.iter().zip(self.lines()).filter(|(_, at)| at.is_some());
+        let lines: Vec<_> = used.map(|(line, _)| line.clone()).collect();
+        let Some(axis_rad) = square_axis(&lines) else { return };
+        for (line, at) in plan.lines.iter().zip(self.lines()) {
+            let off_rad = off_square_rad(line.normal_rad, axis_rad);
+            if let Some(at) = at
+                && off_rad.abs() < MAX_OFF_RAD
+            {
+                normal.add(&[(at, 1.0)], -off_rad, sigma_rad, 1e3);
+            }
+        }
     }
 }

@@ -1,11 +1,10 @@
 //! Joint estimate of poses and lines from the arcs that a plan explains, of any order.
 
-use sonard_model::geometry::{wrap_180, wrap_pi};
+use sonard_model::geometry::wrap_180;
 
 use crate::{
     covariance::PlanCovariance,
     judge::Judge,
-    line::{off_square_rad, square_axis},
     normal::{NormalEquations, move_pose, pose_column},
     posed::{LineColumns, PosedPlan},
     rows::RowBuilder,
@@ -116,7 +115,7 @@ fn step(posed: &mut PosedPlan, judge: &Judge, settings: &RefineSettings) -> Opti
     let mut lines = posed.plan.lines.clone();
     for (line, at) in lines.iter_mut().zip(columns.lines()) {
         if let Some(at) = at {
-            line.normal_rad = wrap_pi(line.normal_rad + step[at]);
+            line.normal_rad += step[at];
             line.distance_m += step[at + 1];
         }
         line.update_feet(&posed.poses);
@@ -156,28 +155,7 @@ fn equations(
         }
     }
     if let Some(sigma_rad) = settings.square_rad {
-        add_square(&mut normal, posed, columns, sigma_rad);
+        columns.add_square(&mut normal, &posed.plan, sigma_rad);
     }
     Some(normal)
-}
-
-/// Ties directions of lines to their common square axis.
-fn add_square(
-    normal: &mut NormalEquations,
-    posed: &PosedPlan,
-    columns: &LineColumns,
-    sigma_rad: f64,
-) {
-    const MAX_OFF_RAD: f64 = 0.12;
-    let used = posed.plan.lines.iter().zip(columns.lines()).filter(|(_, at)| at.is_some());
-    let lines: Vec<_> = used.map(|(line, _)| line.clone()).collect();
-    let Some(axis_rad) = square_axis(&lines) else { return };
-    for (line, at) in posed.plan.lines.iter().zip(columns.lines()) {
-        let off_rad = off_square_rad(line.normal_rad, axis_rad);
-        if let Some(at) = at
-            && off_rad.abs() < MAX_OFF_RAD
-        {
-            normal.add(&[(at, 1.0)], -off_rad, sigma_rad, 1e3);
-        }
-    }
 }

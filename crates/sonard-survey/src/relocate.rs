@@ -6,27 +6,30 @@ use sonard_inverse::{CoarseGrid, locate};
 use sonard_model::geometry::Pose;
 
 use crate::{
-    judge::Judge, options::EXPLAINED_M, posed::PosedPlan, symmetry::pose_score, trace::unexplained,
+    judge::Judge, odometry::in_frame_of_first, options::EXPLAINED_M, posed::PosedPlan,
+    symmetry::pose_score, trace::unexplained,
 };
 
-/// Share of its arcs unexplained from which a sweep is lost.
-const LOST_SHARE: f64 = 0.5;
+/// Share of its arcs unexplained from which a sweep may be lost, with odometry and without.
+const LOST_SHARE: [f64; 2] = [0.3, 0.15];
 /// Minimum gain of another pose, nats.
 const MIN_GAIN: f64 = 10.0;
 /// Maximum share of sweeps that may be lost: the plan is that of the others.
 const MAX_LOST: f64 = 0.5;
 
-/// Poses with those of lost sweeps replaced; `None` if no sweep has a better one.
+/// Poses with those of lost sweeps replaced, in the frame of the first sweep; `None` if no sweep has
+/// a better one.
 pub(crate) fn relocated(posed: &PosedPlan, judge: &Judge) -> Option<Vec<Pose>> {
     let workspace = judge.workspace;
     let segments = posed.plan.segments(&posed.walls);
     let (simulator, predictions) = judge.predictions(&segments)?;
     let left = unexplained(&workspace.arcs, &workspace.readings, &predictions, EXPLAINED_M);
+    let lost_share = LOST_SHARE[usize::from(workspace.moves.is_empty())];
     let is_lost = |sweep: &usize| {
         let of_sweep = left.iter().filter(|arc| arc.sweep == *sweep).count();
-        of_sweep as f64 > LOST_SHARE * workspace.arcs[*sweep].len() as f64
+        of_sweep as f64 > lost_share * workspace.arcs[*sweep].len() as f64
     };
-    let lost: Vec<usize> = (1..posed.poses.len()).filter(is_lost).collect();
+    let lost: Vec<usize> = (0..posed.poses.len()).filter(is_lost).collect();
     if lost.is_empty() || lost.len() as f64 > MAX_LOST * posed.poses.len() as f64 {
         return None;
     }
@@ -50,5 +53,5 @@ pub(crate) fn relocated(posed: &PosedPlan, judge: &Judge) -> Option<Vec<Pose>> {
             is_changed = true;
         }
     }
-    is_changed.then_some(poses)
+    is_changed.then(|| in_frame_of_first(&poses, &posed.poses[0]))
 }

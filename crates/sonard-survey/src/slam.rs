@@ -8,7 +8,7 @@ use crate::{
     arc::Arc,
     bundle::{Bundle, SIGMA_M, SupportedFeature, fit_feature},
     feature::{FeatureKind, VirtualFeature},
-    odometry::Move,
+    odometry::{Move, in_frame_of_first},
 };
 
 /// Maximum difference of an arc's range from that of its feature, metres, while poses are rough
@@ -72,6 +72,41 @@ pub(crate) fn virtual_map<'a>(arcs: &'a [Vec<Arc>], start: Pose, moves: &[Move])
         });
     }
     VirtualMap { poses, features: kept, covariance }
+}
+
+/// Estimates the poses of a course as [`virtual_map`], with the sweeps located in another order, the
+/// first of which begins the map; the frame remains the pose of sweep 0. `moves` are those between
+/// consecutive sweeps of the order, `own_moves` those of the course.
+pub(crate) fn virtual_map_in_order<'a>(
+    arcs: &'a [Vec<Arc>],
+    start: Pose,
+    order: &[usize],
+    (moves, own_moves): (&[Move], &[Move]),
+) -> VirtualMap<'a> {
+    let renamed = |(sweep, &of): (usize, &usize)| {
+        arcs[of].iter().map(|arc| Arc { sweep, ..arc.clone() }).collect()
+    };
+    let ordered: Vec<Vec<Arc>> = order.iter().enumerate().map(renamed).collect();
+    let mut poses = vec![start; order.len()];
+    for (pose, &of) in virtual_map(&ordered, start, moves).poses.into_iter().zip(order) {
+        poses[of] = pose;
+    }
+    let poses = in_frame_of_first(&poses, &start);
+    map_of_poses(arcs, poses, own_moves)
+}
+
+/// Features of a course from rough poses, which are estimated together with them.
+pub(crate) fn map_of_poses<'a>(
+    arcs: &'a [Vec<Arc>],
+    mut poses: Vec<Pose>,
+    moves: &[Move],
+) -> VirtualMap<'a> {
+    let (mut features, mut covariance) = (Vec::new(), None);
+    for _ in 0..3 {
+        features = reassociated(&features, arcs, &poses);
+        covariance = Bundle { poses: &mut poses, features: &mut features, moves }.solve();
+    }
+    VirtualMap { poses, features, covariance }
 }
 
 fn suggested<'a>(arc: &'a Arc, pose: &Pose) -> [SupportedFeature<'a>; 2] {

@@ -9,9 +9,9 @@ use sonard_model::{
 
 use crate::{
     arrangement::{JOINED_M, LineArrangement, PieceSet, Run},
-    judge::Judge,
+    judge::{Judge, Predictions},
     options::EXPLAINED_M,
-    trace::explain,
+    trace::{ExplainedArc, explain},
 };
 
 /// Share of the beams of an arc that must agree.
@@ -19,6 +19,9 @@ const SHARE: f64 = 0.5;
 /// Minimum number of sweeps whose echoes determine a wall. From one place, the echo of a wall looks
 /// like that of an edge or of a path of higher order.
 const MIN_SWEEPS: usize = 2;
+/// Minimum share of the arcs of each sweep that a plan explains for its walls to be observed, with
+/// odometry and without, where nothing else confirms a pose.
+const MIN_EXPLAINED: [f64; 2] = [0.7, 0.85];
 /// Minimum cosine of an angle of incidence.
 const MIN_COSINE: f64 = 0.1;
 
@@ -58,15 +61,12 @@ pub(crate) fn observed_stretches(
     };
     let wavelength_m = judge.workspace.wavelength_m();
     let mut echoes = Vec::new();
-    for arc in judge.workspace.arcs.iter().flatten() {
-        let (readings, predictions) = (&judge.readings()[arc.sweep], &predictions[arc.sweep]);
-        let explained = explain(arc, readings, predictions, EXPLAINED_M, SHARE);
-        let Some(path) = explained.as_ref().and_then(|explained| explained.path()) else {
-            continue;
-        };
-        let place = judge.poses[arc.sweep].position();
-        if let Some(reflections) = mirror_spots(plan, &runs, &parts, path, (place, wavelength_m)) {
-            echoes.push(MirrorEcho { sweep: arc.sweep, reflections });
+    for explained in consistent_arcs(judge, &predictions).unwrap_or_default() {
+        let Some(path) = explained.path() else { continue };
+        let sweep = explained.arc.sweep;
+        let place = (judge.poses[sweep].position(), wavelength_m);
+        if let Some(reflections) = mirror_spots(plan, &runs, &parts, path, place) {
+            echoes.push(MirrorEcho { sweep, reflections });
         }
     }
     let spots = determined_spots(&echoes, parts.len());
@@ -84,6 +84,29 @@ pub(crate) fn observed_stretches(
         stretches[part.wall].extend(stretches_of(spots, ends));
     }
     stretches
+}
+
+/// Explained arcs; `None` where a sweep has too many unexplained ones: then its pose may be wrong,
+/// and the walls that it shares with the others.
+fn consistent_arcs<'a>(
+    judge: &Judge<'a>,
+    predictions: &'a Predictions,
+) -> Option<Vec<ExplainedArc<'a>>> {
+    let workspace = judge.workspace;
+    let is_lone = workspace.moves.is_empty();
+    let min_share = MIN_EXPLAINED[usize::from(is_lone)];
+    let mut all = Vec::new();
+    for (arcs, (readings, predictions)) in
+        workspace.arcs.iter().zip(judge.readings().iter().zip(predictions))
+    {
+        let of = |arc| explain(arc, readings, predictions, EXPLAINED_M, SHARE);
+        let explained: Vec<ExplainedArc> = arcs.iter().filter_map(of).collect();
+        if (explained.len() as f64) < min_share * arcs.len() as f64 {
+            return None;
+        }
+        all.extend(explained);
+    }
+    Some(all)
 }
 
 /// Part of a wall between others that end on it or cross it.

@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use sonard_inverse::{FitSweep, World};
 use sonard_model::{
-    geometry::{DVec2, Pose},
+    geometry::{DVec2, Pose, wrap_180},
     scene::{Material, Scene},
 };
 
 use crate::{
     alternatives::{Assessment, assess},
     arrangement::{LineArrangement, Segment},
+    boxes::with_box,
     bundle::{SupportedFeature, fit_feature},
     candidates::CandidateSources,
     covariance::PlanCovariance,
@@ -29,7 +30,7 @@ use crate::{
     result::{SearchEnd, Survey},
     scores::PlanScores,
     search::{PlanSearch, initial_walls},
-    slam::{reassociated, virtual_map},
+    slam::{VirtualMap, map_of_poses, virtual_map, virtual_map_in_order},
     trace::unexplained,
     workspace::Workspace,
 };
@@ -51,10 +52,14 @@ const ROUNDS: [Round; 3] = [
 ];
 /// Maximum number of restarts from the long walls.
 const MAX_RESTARTS: usize = 2;
+/// Maximum number of boxes that are completed.
+const MAX_BOXES: usize = 3;
 /// Length below which a wall is dropped by a restart, metres.
 const SHORT_M: f64 = 0.3;
 /// Maximum number of rounds.
 const MAX_ROUNDS: usize = 6;
+/// Share of all arcs unexplained from which a course may be wrong.
+const DOUBTFUL_SHARE: f64 = 0.2;
 /// Gain of a round below which the last one is not repeated, nats.
 const MIN_ROUND_GAIN: f64 = 0.5;
 const REFINE_STEPS: usize = 4;
@@ -94,10 +99,11 @@ pub fn resume_survey(
     workspace.limit_scenes((SEARCH_SHARE * options.max_scenes as f64) as usize);
     let mut search = SurveySearch::new(&workspace, options);
     search.run();
+    let early_end = search.early_end();
     workspace.limit_scenes(options.max_scenes);
-    let end = search.end();
     search.report_progress(SurveyStage::Alternatives);
     let assessment = search.settle();
+    let end = early_end.unwrap_or_else(|| search.last_end());
     Ok(report(sweeps, &search.posed, &assessment, &search.covariance, &workspace, (end, options)))
 }
 
@@ -169,22 +175,73 @@ struct SurveySearch<'a> {
     score: Option<f64>,
 }
 
+/// State to which a search returns where a trial loses.
+struct SearchState<'a> {
+    features: Vec<SupportedFeature<'a>>,
+    posed: PosedPlan,
+    covariance: Option<PlanCovariance>,
+    score: Option<f64>,
+}
+
 impl<'a> SurveySearch<'a> {
     /// Begins with the poses of the virtual map.
     fn new(workspace: &'a Workspace<'a>, options: &'a SurveyOptions) -> Self {
         let start = workspace.readings[0].odometry;
-        let empty = LineArrangement::new(Vec::new(), &[start], 0.0);
-        let posed = PosedPlan { plan: empty, walls: Default::default(), poses: Vec::new() };
+        let posed = PosedPlan::without_walls(Vec::new());
         let mut search =
             Self { workspace, options, features: Vec::new(), posed, covariance: None, score: None };
         search.report_progress(SurveyStage::Course);
-        let map = virtual_map(&workspace.arcs, start, &workspace.moves);
-        (search.features, search.posed.poses) = (map.features, map.poses);
+        search.begin(virtual_map(&workspace.arcs, start, &workspace.moves));
         search
     }
 
-    /// Runs the rounds; where arcs remain unexplained, begins again from the long walls alone.
+    /// Begins with a course and no walls.
+    fn begin(&mut self, map: VirtualMap<'a>) {
+        (self.features, self.posed) = (map.features, PosedPlan::without_walls(map.poses));
+        (self.covariance, self.score) = (None, None);
+    }
+
+    /// Searches poses and walls; where many arcs remain unexplained, again with the sweeps located
+    /// in other orders, and keeps the best.
     fn run(&mut self) {
+        self.run_from_course();
+        let count = self.workspace.arcs.len();
+        let tried = orders(count, self.options.odometry.is_some());
+        for order in tried {
+            if self.workspace.is_over() || !self.is_doubtful() {
+                break;
+            }
+            let map = self.map_in_order(&order);
+            if are_same_course(&map.poses, &self.posed.poses) {
+                continue;
+            }
+            let before = self.state();
+            self.begin(map);
+            self.run_from_course();
+            if self.score < before.score {
+                self.restore(before);
+            }
+        }
+    }
+
+    fn map_in_order(&self, order: &[usize]) -> VirtualMap<'a> {
+        let workspace = self.workspace;
+        let odometry = |sweep: &usize| workspace.readings[*sweep].odometry;
+        let poses: Vec<Pose> = order.iter().map(odometry).collect();
+        let between = |sigma| Move::between(&poses, sigma);
+        let moves = self.options.odometry.map_or_else(Vec::new, between);
+        let start = workspace.readings[0].odometry;
+        virtual_map_in_order(&workspace.arcs, start, order, (&moves, &workspace.moves))
+    }
+
+    /// Returns `true` if more arcs are unexplained than in a plan whose poses are right.
+    fn is_doubtful(&self) -> bool {
+        let all: usize = self.workspace.arcs.iter().map(Vec::len).sum();
+        self.left().len() as f64 > DOUBTFUL_SHARE * all as f64
+    }
+
+    /// Runs the rounds; where arcs remain unexplained, begins again from the long walls alone.
+    fn run_from_course(&mut self) {
         self.rounds(0);
         self.find_lost_sweeps();
         for _ in 0..MAX_RESTARTS {
@@ -194,34 +251,55 @@ impl<'a> SurveySearch<'a> {
             let before = self.state();
             self.drop_short_walls();
             self.rounds(1);
-            if self.score < before.2 {
+            if self.score < before.score {
+                self.restore(before);
+                break;
+            }
+        }
+        self.find_boxes();
+    }
+
+    /// Completes boxes of which faces are found, or echoes remain unexplained, one after the other.
+    fn find_boxes(&mut self) {
+        for _ in 0..MAX_BOXES {
+            let judge = Judge::new(self.workspace, &self.posed.poses, FINAL_SIGMA_M);
+            let grown =
+                (!self.workspace.is_over()).then(|| with_box(&self.posed, &judge, &self.left()));
+            let Some(grown) = grown.flatten() else { break };
+            let before = self.state();
+            self.posed = grown;
+            self.refine(&judge, ROUNDS[ROUNDS.len() - 1].gate_m);
+            self.rounds(ROUNDS.len() - 1);
+            if self.score < before.score {
                 self.restore(before);
                 break;
             }
         }
     }
 
-    fn state(&self) -> (PosedPlan, Option<PlanCovariance>, Option<f64>) {
-        (self.posed.clone(), self.covariance.clone(), self.score)
+    fn state(&self) -> SearchState<'a> {
+        let (features, posed) = (self.features.clone(), self.posed.clone());
+        SearchState { features, posed, covariance: self.covariance.clone(), score: self.score }
     }
 
-    fn restore(&mut self, state: (PosedPlan, Option<PlanCovariance>, Option<f64>)) {
-        (self.posed, self.covariance, self.score) = state;
+    fn restore(&mut self, state: SearchState<'a>) {
+        let SearchState { features, posed, covariance, score } = state;
+        (self.features, self.posed) = (features, posed);
+        (self.covariance, self.score) = (covariance, score);
     }
 
     /// Locates sweeps whose poses the course got wrong in the plan of the others, and begins again
-    /// from its long walls.
+    /// with these poses.
     fn find_lost_sweeps(&mut self) {
         for _ in 0..MAX_RESTARTS {
             let judge = Judge::new(self.workspace, &self.posed.poses, FINAL_SIGMA_M);
             let moved = (!self.workspace.is_over()).then(|| relocated(&self.posed, &judge));
             let Some(poses) = moved.flatten() else { break };
             let before = self.state();
-            self.features = reassociated(&self.features, &self.workspace.arcs, &poses);
-            self.posed.poses = poses;
-            self.drop_short_walls();
-            self.rounds(1);
-            if self.score < before.2 {
+            let workspace = self.workspace;
+            self.begin(map_of_poses(&workspace.arcs, poses, &workspace.moves));
+            self.rounds(0);
+            if self.score < before.score {
                 self.restore(before);
                 break;
             }
@@ -325,16 +403,16 @@ impl<'a> SurveySearch<'a> {
         }
     }
 
-    fn end(&self) -> SearchEnd {
+    fn early_end(&self) -> Option<SearchEnd> {
         if self.workspace.observer.is_cancelled() {
-            SearchEnd::Cancelled
-        } else if self.workspace.is_spent() {
-            SearchEnd::Budget
-        } else if self.left().is_empty() {
-            SearchEnd::Complete
+            Some(SearchEnd::Cancelled)
         } else {
-            SearchEnd::UnexplainedArcs
+            self.workspace.is_spent().then_some(SearchEnd::Budget)
         }
+    }
+
+    fn last_end(&self) -> SearchEnd {
+        if self.left().is_empty() { SearchEnd::Complete } else { SearchEnd::UnexplainedArcs }
     }
 
     /// Judges the walls; continues with an alternative that is better.
@@ -342,7 +420,8 @@ impl<'a> SurveySearch<'a> {
         let last = &ROUNDS[ROUNDS.len() - 1];
         for is_last in [false, false, true] {
             let judge = Judge::new(self.workspace, &self.posed.poses, last.sigma_m);
-            polish(&mut self.posed, &judge);
+            let square_rad = self.options.square_deg.map(f64::to_radians);
+            polish(&mut self.posed, &judge, square_rad);
             let judge = Judge::new(self.workspace, &self.posed.poses, last.sigma_m);
             let mut assessment = assess(&self.posed, &judge);
             match assessment.better.take().filter(|_| !is_last) {
@@ -364,6 +443,31 @@ impl<'a> SurveySearch<'a> {
             walls: self.posed.plan.runs(&self.posed.walls).len(),
         });
     }
+}
+
+/// Orders in which the sweeps of a course are located if its own fails: backwards; without
+/// odometry also from sweeps within it, alternately to both sides.
+fn orders(count: usize, is_odometry_used: bool) -> Vec<Vec<usize>> {
+    let mut found = vec![(0..count).rev().collect()];
+    if !is_odometry_used {
+        for first in [count / 2, count / 4, 3 * count / 4] {
+            let mut order: Vec<usize> = (0..count).collect();
+            order.sort_by_key(|at| (at.abs_diff(first), *at));
+            found.push(order);
+        }
+    }
+    found
+}
+
+/// Returns `true` if all poses of two courses are near each other.
+fn are_same_course(a: &[Pose], b: &[Pose]) -> bool {
+    const NEAR_M: f64 = 0.03;
+    const NEAR_DEG: f64 = 2.0;
+    let is_same = |(a, b): (&Pose, &Pose)| {
+        a.position().distance(b.position()) < NEAR_M
+            && wrap_180(a.heading_deg - b.heading_deg).abs() < NEAR_DEG
+    };
+    a.iter().zip(b).all(is_same)
 }
 
 /// Turns lines to the nearest direction of a common square axis.

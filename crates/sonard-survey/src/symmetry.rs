@@ -67,7 +67,7 @@ fn motions(segments: &[Segment]) -> Vec<Motion> {
 }
 
 /// Log-likelihood of a sweep's readings and of the moves to and from it with another pose, nats;
-/// `None` if the scene has more paths than the model follows. The first sweep is the frame.
+/// `None` if the scene has more paths than the model follows.
 pub(crate) fn pose_score(
     posed: &PosedPlan,
     judge: &Judge,
@@ -82,7 +82,8 @@ pub(crate) fn pose_score(
 /// Negative log-density of the moves to and from a sweep with another pose, nats.
 fn odometry_loss(posed: &PosedPlan, judge: &Judge, sweep: usize, pose: &Pose) -> f64 {
     let moves = &judge.workspace.moves;
-    let before = moves.get(sweep - 1).map(|step| step.loss(&posed.poses[sweep - 1], pose));
+    let before = sweep.checked_sub(1).and_then(|from| Some((moves.get(from)?, &posed.poses[from])));
+    let before = before.map(|(step, from)| step.loss(from, pose));
     let after = moves.get(sweep).zip(posed.poses.get(sweep + 1));
     let after = after.map(|(step, next)| step.loss(pose, next));
     before.unwrap_or(0.0) + after.unwrap_or(0.0)

@@ -1,5 +1,6 @@
 //! Tests of the stages against known rooms.
 
+mod boxes;
 mod rectangle;
 mod stages;
 mod undetermined;

@@ -13,7 +13,7 @@ use std::{error::Error, sync::Arc};
 use sonard_inverse::World;
 use sonard_model::{
     acoustics::{Air, Sensor},
-    geometry::{DVec2, Pose, wrap_180},
+    geometry::{DVec2, Pose, distance_to_segment, wrap_180},
     model::Options,
     scene::Scene,
 };
@@ -57,14 +57,22 @@ struct Trial {
     lead_nats: f64,
     /// Length of walls reported as observed that are none, metres.
     wrong_observed_m: f64,
-    /// Numbers of poses and corners whose 95 % interval holds the truth, each with that of all.
-    intervals: [[usize; 2]; 2],
+    /// Numbers of 95 % intervals that hold the truth, each with that of all, by [`QUANTITIES`].
+    intervals: [[usize; 2]; QUANTITIES.len()],
     /// An alternative is the true room.
     is_listed: bool,
+    /// No other plan found scores within 10 nats of the true room.
+    is_determined: bool,
+    /// Numbers of unexplained arcs and of all.
+    arcs: [usize; 2],
     end: SearchEnd,
     scenes: usize,
     seconds: f64,
 }
+
+/// Quantities with intervals.
+const QUANTITIES: [&str; 6] =
+    ["x", "y", "heading", "wall's position", "wall's direction", "corner"];
 
 const MAX_RANGE_M: f64 = 4.0;
 /// Number of places that the survey does not visit.
@@ -75,6 +83,8 @@ const COMPLETE: f64 = 0.995;
 const FOUND: f64 = 0.9;
 /// Deficit of score from which a failure is one of the search, nats.
 const SEARCH_NATS: f64 = 5.0;
+/// Deficit of score up to which another plan leaves a room undetermined, nats.
+const OPEN_NATS: f64 = 10.0;
 
 impl Trial {
     fn is_complete(&self) -> bool {
@@ -93,6 +103,7 @@ impl Trial {
 fn main() -> Result<(), Box<dyn Error>> {
     let settings = Settings::from_args()?;
     println!("{HEAD}");
+    let mut all = Vec::new();
     for &kind in &settings.kinds {
         let mut trials = Vec::new();
         for seed in settings.seeds.clone() {
@@ -103,12 +114,14 @@ fn main() -> Result<(), Box<dyn Error>> {
             trials.push(trial);
         }
         print_summary(kind, &trials);
+        all.extend(trials);
     }
+    print_intervals(&all);
     Ok(())
 }
 
 const HEAD: &str = "| kind | rooms | complete | recall | precision | corner mm | position mm | heading deg | \
-held | true room | score within 5 | wrong observed m | outer recall | faces found | 95 % of poses | 95 % of corners | CPU s | scenes |";
+held | true room | score within 5 | wrong observed m | outer recall | faces found | determined | complete of these | CPU s | scenes |";
 
 fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn Error>> {
     let mut random = generator(kind, seed);
@@ -157,7 +170,7 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
         print_walls(&found, &motion, &truth);
     }
     // The frame of the survey is the first pose of odometry, which is the true one.
-    let intervals = [pose_intervals(&found, &poses), corner_intervals(&found, &truth)];
+    let intervals = intervals(&found, &poses, &truth);
     let scene = found.scene("found", false).build()?;
     let (outer, inner): (Vec<Ends>, Vec<Ends>) = {
         let mut inner = Vec::new();
@@ -174,12 +187,19 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
     };
     let is_found = |face: &&Ends| coverage(std::slice::from_ref(*face), &walls, 0.02, 2.0) > FOUND;
     let in_frame = |sweep: &sonard_inverse::FitSweep| motion.inverse_of(&sweep.pose);
-    let is_listed = found.alternatives.iter().any(|plan| {
+    let is_true = |walls: &[Ends]| {
+        coverage(&truth, walls, 0.02, 2.0) > COMPLETE
+            && coverage(walls, &truth, 0.02, 2.0) > COMPLETE
+    };
+    let others = found.alternatives.iter().map(|plan| {
         let walls = plan.walls.iter().map(|ends| ends.map(|end| motion.of(end.into())));
-        let walls: Vec<Ends> = walls.collect();
-        coverage(&truth, &walls, 0.02, 2.0) > COMPLETE
-            && coverage(&walls, &truth, 0.02, 2.0) > COMPLETE
+        (is_true(&walls.collect::<Vec<_>>()), found.score + plan.score_difference)
     });
+    let others: Vec<(bool, f64)> = others.collect();
+    let is_open = |&(is_true, score): &(bool, f64)| !is_true && score > true_score - OPEN_NATS;
+    let best = [(is_true(&walls), found.score)];
+    let is_determined = !others.iter().chain(&best).any(is_open);
+    let is_listed = others.iter().any(|(is_true, _)| *is_true);
     Ok(Trial {
         seed,
         recall: coverage(&truth, &walls, 0.02, 2.0),
@@ -195,6 +215,8 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
         wrong_observed_m: wrong,
         intervals,
         is_listed,
+        is_determined,
+        arcs: [found.unexplained.len(), found.arcs],
         end: found.end,
         scenes: found.scored_scenes,
         seconds,
@@ -219,9 +241,17 @@ fn nearest_poses(found: &Survey, truth: &[Pose]) -> Vec<Pose> {
     all.into_iter().min_by(|a, b| off_m(a).total_cmp(&off_m(b))).unwrap_or_default()
 }
 
-/// Numbers of coordinates of poses within 1.96 standard deviations of the truth, and of all.
-fn pose_intervals(found: &Survey, truth: &[Pose]) -> [usize; 2] {
-    const NORMAL_95: f64 = 1.96;
+/// Numbers of 95 % intervals that hold the truth, and of all, by [`QUANTITIES`].
+fn intervals(found: &Survey, poses: &[Pose], truth: &[Ends]) -> [[usize; 2]; QUANTITIES.len()] {
+    let of_poses = pose_deviations(found, poses);
+    let of_walls = wall_deviations(found, truth);
+    let [x, y, heading] = [0, 1, 2].map(|at| count_inside(of_poses.iter().map(|of| of[at])));
+    let [position, direction] = [0, 1].map(|at| count_inside(of_walls.iter().map(|of| of[at])));
+    [x, y, heading, position, direction, count_inside(corner_deviations(found, truth).into_iter())]
+}
+
+/// Deviations of x, y and heading of poses, in standard deviations.
+fn pose_deviations(found: &Survey, truth: &[Pose]) -> Vec<[f64; 3]> {
     let deviations = found.poses.iter().zip(truth).skip(1).filter_map(|(of, truth)| {
         let [x_m, y_m] = of.sigma_m?;
         let turn_deg = wrap_180(of.pose.heading_deg - truth.heading_deg);
@@ -231,29 +261,54 @@ fn pose_intervals(found: &Survey, truth: &[Pose]) -> [usize; 2] {
             turn_deg / of.sigma_heading_deg?,
         ])
     });
-    count_inside(deviations.flatten().map(|off| off.abs() <= NORMAL_95))
+    deviations.collect()
 }
 
-/// Numbers of ends of walls at a true corner within the 95 % ellipse, and of all with a covariance.
-fn corner_intervals(found: &Survey, truth: &[Ends]) -> [usize; 2] {
+/// Deviations of the middles of walls from the true wall near them, and of their directions, in
+/// standard deviations.
+fn wall_deviations(found: &Survey, truth: &[Ends]) -> Vec<[f64; 2]> {
+    const NEAR_M: f64 = 0.02;
+    let deviations = found.walls.iter().filter_map(|wall| {
+        let [a, b] = [wall.from, wall.to].map(|end| DVec2::from(end.at_m));
+        let middle = a.midpoint(b);
+        let is_near = |[c, d]: &&Ends| distance_to_segment(middle, *c, *d) < NEAR_M;
+        let [c, d] = truth.iter().find(is_near)?;
+        let along = (*d - *c).normalize();
+        let turn_deg = (b - a).angle_to(along).to_degrees();
+        let turn_deg = turn_deg - 180.0 * (turn_deg / 180.0).round();
+        Some([
+            along.perp_dot(middle - *c) / wall.sigma_across_m?,
+            turn_deg / wall.sigma_direction_deg?,
+        ])
+    });
+    deviations.collect()
+}
+
+/// Deviations of ends of walls from the true corners near them, as quantiles of a normal
+/// distribution with the same probability as that of the distance.
+fn corner_deviations(found: &Survey, truth: &[Ends]) -> Vec<f64> {
     /// Quantile of the chi-square distribution with two degrees of freedom.
     const CHI_SQUARE_95: f64 = 5.991;
     const NEAR_M: f64 = 0.02;
     let ends = found.walls.iter().flat_map(|wall| [&wall.from, &wall.to]);
-    let inside = ends.filter_map(|end| {
+    let deviations = ends.filter_map(|end| {
         let [xx, xy, yy] = end.covariance_m2?;
         let corners = truth.iter().flatten().map(|corner| DVec2::from(end.at_m) - *corner);
         let off = corners.min_by(|a, b| a.length().total_cmp(&b.length()))?;
         let square = yy * off.x * off.x - 2.0 * xy * off.x * off.y + xx * off.y * off.y;
         let square = square / (xx * yy - xy * xy);
-        (off.length() < NEAR_M).then_some(square <= CHI_SQUARE_95)
+        (off.length() < NEAR_M).then_some(NORMAL_95 * (square / CHI_SQUARE_95).sqrt())
     });
-    count_inside(inside)
+    deviations.collect()
 }
 
-/// Numbers of values inside, and of all.
-fn count_inside(are_inside: impl Iterator<Item = bool>) -> [usize; 2] {
-    are_inside.fold([0, 0], |[inside, all], is_inside| [inside + usize::from(is_inside), all + 1])
+/// Quantile of the normal distribution that bounds 95 % on both sides.
+const NORMAL_95: f64 = 1.96;
+
+/// Numbers of deviations within 95 % intervals, and of all.
+fn count_inside(deviations: impl Iterator<Item = f64>) -> [usize; 2] {
+    deviations
+        .fold([0, 0], |[inside, all], off| [inside + usize::from(off.abs() <= NORMAL_95), all + 1])
 }
 
 /// CPU time of all threads so far, seconds (Linux).
@@ -297,7 +352,8 @@ fn print_trial(kind: RoomKind, trial: &Trial) {
     let corner_mm = 1e3 * median(trial.corners_m.clone());
     println!(
         "# {kind} {}: recall {:.3} precision {:.3} corner {corner_mm:.1} mm poses {:.2} mm {:.3} deg held {:.3} \
-         ({:.3}) score {:+.1} observed wrong {:.2} m listed {} {:?} {} scenes {:.1} s {}",
+         ({:.3}) score {:+.1} observed wrong {:.2} m listed {} determined {} unexplained {} of {} arcs {:?} {} scenes \
+         {:.1} s {}",
         trial.seed,
         trial.recall,
         trial.precision,
@@ -308,6 +364,9 @@ fn print_trial(kind: RoomKind, trial: &Trial) {
         trial.lead_nats,
         trial.wrong_observed_m,
         trial.is_listed,
+        trial.is_determined,
+        trial.arcs[0],
+        trial.arcs[1],
         trial.end,
         trial.scenes,
         trial.seconds,
@@ -319,14 +378,10 @@ fn print_summary(kind: RoomKind, trials: &[Trial]) {
     let count = trials.len().max(1) as f64;
     let mean = |of: &dyn Fn(&Trial) -> f64| trials.iter().map(of).sum::<f64>() / count;
     let middle = |of: &dyn Fn(&Trial) -> f64| median(trials.iter().map(of).collect());
-    let intervals = |of: usize| {
-        let sum = |at: usize| trials.iter().map(|trial| trial.intervals[of][at]).sum::<usize>();
-        sum(0) as f64 / sum(1).max(1) as f64
-    };
     let corners: Vec<f64> =
         trials.iter().flat_map(|trial| trial.corners_m.iter().copied()).collect();
     println!(
-        "| {kind} | {} | {} | {:.3} | {:.3} | {:.2} | {:.2} | {:.3} | {:.3} | {:.3} | {} | {:.2} | {:.3} | {} of {} | {:.3} | {:.3} | {:.1} | {:.0} |",
+        "| {kind} | {} | {} | {:.3} | {:.3} | {:.2} | {:.2} | {:.3} | {:.3} | {:.3} | {} | {:.2} | {:.3} | {} of {} | {} | {} | {:.1} | {:.0} |",
         trials.len(),
         trials.iter().filter(|trial| trial.is_complete()).count(),
         mean(&|trial| trial.recall),
@@ -342,11 +397,20 @@ fn print_summary(kind: RoomKind, trials: &[Trial]) {
         mean(&|trial| trial.outer_recall),
         trials.iter().map(|trial| trial.faces[1]).sum::<usize>(),
         trials.iter().map(|trial| trial.faces[0]).sum::<usize>(),
-        intervals(0),
-        intervals(1),
+        trials.iter().filter(|trial| trial.is_determined).count(),
+        trials.iter().filter(|trial| trial.is_determined && trial.is_complete()).count(),
         mean(&|trial| trial.seconds),
         mean(&|trial| trial.scenes as f64),
     );
+}
+
+/// Prints how many of the 95 % intervals hold the truth.
+fn print_intervals(trials: &[Trial]) {
+    for (at, quantity) in QUANTITIES.iter().enumerate() {
+        let sum = |of: usize| trials.iter().map(|trial| trial.intervals[at][of]).sum::<usize>();
+        let [inside, all] = [sum(0), sum(1)];
+        println!("95 % intervals of {quantity}: {inside} of {all} hold the truth");
+    }
 }
 
 impl Settings {

@@ -9,8 +9,12 @@ use crate::{
     faces::cells,
     judge::Judge,
     moves::MoveFinder,
+    odometry::Move,
+    polish::polish,
+    posed::PosedPlan,
     progress::NoObserver,
     search::{PlanSearch, initial_walls},
+    slam::virtual_map_in_order,
 };
 
 /// Every wall has an arc at the distance of its perpendicular, and the farthest corner has one at
@@ -73,6 +77,58 @@ fn course_is_found_without_a_scene() {
             crate::VirtualFeature::Point { .. } => false,
         });
         assert!(is_found, "wall {a} {b}: {:?}", map.features);
+    }
+}
+
+/// Located from the last sweep to the first, a course is the same in the frame of the first.
+#[test]
+fn course_is_found_backwards() {
+    let (corners, poses) = (rectangle(), stops());
+    let world = world(&corners);
+    let sweeps = sweeps(&world, &poses, &drifted(&poses));
+    let scores = PlanScores::default();
+    let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
+    let order = [3, 2, 1, 0];
+    let odometry = order.map(|sweep| sweeps[sweep].pose);
+    let moves = Move::between(&odometry, OdometrySigma::default());
+    let map = virtual_map_in_order(&workspace.arcs, poses[0], &order, (&moves, &workspace.moves));
+    assert_eq!(map.poses[0], poses[0]);
+    for (found, truth) in map.poses.iter().zip(&poses) {
+        let off_m = found.position().distance(truth.position());
+        let off_deg = wrap_180(found.heading_deg - truth.heading_deg).abs();
+        assert!(off_m < 0.003 && off_deg < 0.4, "{found:?} {truth:?}");
+    }
+}
+
+/// The estimate by all readings corrects poses and lines.
+#[test]
+fn polish_returns_to_the_true_room() {
+    let (corners, truth) = (rectangle(), stops());
+    let world = world(&corners);
+    let sweeps = sweeps(&world, &truth, &truth);
+    let scores = PlanScores::default();
+    let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
+    let mut poses = truth.clone();
+    for (at, pose) in poses.iter_mut().enumerate().skip(1) {
+        let sign = if at % 2 == 0 { 1.0 } else { -1.0 };
+        pose.x_m += 0.001 * sign;
+        pose.heading_deg += 0.1 * sign;
+    }
+    let turn = DVec2::from_angle(0.001);
+    let turned: Vec<DVec2> = corners.iter().map(|corner| turn.rotate(*corner)).collect();
+    let (plan, walls) = plan_of(&sides(&turned), &poses);
+    let mut posed = PosedPlan { plan, walls, poses: poses.clone() };
+    let judge = Judge::new(&workspace, &poses, 0.004);
+    polish(&mut posed, &judge, None).expect("determined");
+    for (pose, truth) in posed.poses.iter().zip(&truth).skip(1) {
+        let off_m = pose.position().distance(truth.position());
+        let off_deg = wrap_180(pose.heading_deg - truth.heading_deg);
+        assert!(off_m < 5e-4 && off_deg.abs() < 0.03, "{pose:?} {truth:?}");
+    }
+    let (expected, _) = plan_of(&sides(&corners), &truth);
+    for (line, truth) in posed.plan.lines.iter().zip(&expected.lines) {
+        let turn_deg = line.angle_to(truth).to_degrees();
+        assert!(turn_deg < 0.03, "{turn_deg}");
     }
 }
 

@@ -39,6 +39,29 @@ fn wall_without_evidence_is_never_observed() {
     }
 }
 
+/// A course with two wrong poses of four explains half of the arcs only.
+#[test]
+fn walls_of_a_lost_course_are_not_observed() {
+    let (corners, truth) = (rectangle(), stops());
+    let world = world(&corners);
+    let sweeps = sweeps(&world, &truth, &truth);
+    let scores = PlanScores::default();
+    let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
+    let observed = |poses: &[Pose]| {
+        let judge = Judge::new(&workspace, poses, 0.004);
+        let (plan, walls) = plan_of(&sides(&corners), poses);
+        let assessment = assess(&PosedPlan { plan, walls, poses: poses.to_vec() }, &judge);
+        let pieces = assessment.walls.iter().flat_map(|wall| &wall.pieces);
+        pieces.filter(|piece| piece.status == PieceStatus::Observed).count()
+    };
+    assert!(observed(&truth) >= 4);
+    let mut poses = truth.clone();
+    for pose in &mut poses[2..] {
+        (pose.x_m, pose.heading_deg) = (pose.x_m - 0.3, pose.heading_deg + 40.0);
+    }
+    assert_eq!(observed(&poses), 0);
+}
+
 /// A rectangle looks alike from two poses half a turn apart; odometry excludes one of them.
 #[test]
 fn half_turn_of_a_rectangle_is_open_without_odometry() {
