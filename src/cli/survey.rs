@@ -23,10 +23,9 @@ use super::{
 use crate::{
     inverse::{FitSweep, World},
     scan::{Provenance, Session, text::format_count},
-    scene::Scene,
     survey::{
         OdometrySigma, PlanScores, SearchEnd, Survey, SurveyError, SurveyObserver, SurveyOptions,
-        SurveyProgress, SurveyStage, resume_survey,
+        SurveyProgress, SurveyStage, resume_survey, unknown_room,
     },
 };
 
@@ -85,8 +84,8 @@ Each stretch of wall is observed (explained echoes of two sweeps or more determi
 plans that explain the readings nearly as well are listed with their probabilities. The frame is \
 the pose of the first sweep in the log. Dimensions follow the speed of sound: 0.17 % per degree.
 
-An interrupted survey, or one whose budget is spent, writes the best plan so far and \
-unfinished.jsonl, from which the same command continues; --max-scenes may differ.";
+An interrupted survey, or one whose budget is spent, writes the best plan so far. The same command \
+continues from unfinished.jsonl, also after the program was killed; --max-scenes may differ.";
 
 const HELP: &str = "\
 Files in DIR: scene.json with the stops as poses; poses.csv; survey.json with covariances, status, \
@@ -118,7 +117,8 @@ pub(super) fn run(args: &Args) -> Outcome {
     let overwrite = args.overwrite.or_forced(saved.is_some());
     files::check(&args.out, overwrite)?;
     let scores = saved.unwrap_or_default();
-    let found = find(args, &input, &scores)?;
+    let search = || find(args, &input, &scores);
+    let found = checkpoint::while_saving(&args.out, overwrite, &head, &scores, search)?;
     files::write(args, overwrite, &input, &found)?;
     match found.end {
         SearchEnd::Complete | SearchEnd::UnexplainedArcs => checkpoint::remove(&args.out)?,
@@ -186,10 +186,10 @@ fn read(args: &Args, what_if: &WhatIf) -> Result<Input, Failure> {
             let Some(session) = scan.session.clone() else { return Ok(()) };
             match &mut input {
                 None => {
-                    let (air, mut options) = conditions(log, &session)?;
-                    let sensor_m = session.sensor.max_range_m;
-                    options.max_range_m = Some(args.max_range.min(sensor_m));
-                    let world = World::new(unknown_room()?, session.sensor.clone(), air, options);
+                    let (air, options) = conditions(log, &session)?;
+                    let sensor = session.sensor.clone();
+                    let world = unknown_room(sensor, air, options, args.max_range);
+                    let world = world.map_err(|error| failure_from(&error))?;
                     let provenances = vec![session.provenance];
                     input = Some((session, Input { sweeps: vec![sweep], world, provenances }));
                 }
@@ -216,12 +216,6 @@ fn read(args: &Args, what_if: &WhatIf) -> Result<Input, Failure> {
     })
 }
 
-/// Scene without walls.
-fn unknown_room() -> Result<Arc<Scene>, Failure> {
-    let empty = Scene::builder("unknown room").material("wall", 0.97).build();
-    empty.map(Arc::new).map_err(|error| Failure::input(error, "report this as a bug"))
-}
-
 /// Surveys until done or interrupted.
 fn find(args: &Args, input: &Input, scores: &PlanScores) -> Result<Survey, Failure> {
     let runtime = runtime::new()?;
@@ -241,7 +235,7 @@ fn failure_from(error: &SurveyError) -> Failure {
     let help = match error {
         SurveyError::TooFewSweeps(_) => "give the sweeps of several places, in one log or several",
         SurveyError::NoArcs(_) => "leave this scan out, or raise --max-range",
-        SurveyError::World(_) | SurveyError::Option { .. } => {
+        SurveyError::World(_) | SurveyError::Scene(_) | SurveyError::Option { .. } => {
             "check sensor and air of the logs, and the options"
         }
     };

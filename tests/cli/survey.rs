@@ -1,10 +1,10 @@
 //! Survey of an unknown room, through the whole program.
 
-use std::{fs, path::Path};
+use std::{fs, path::Path, process::Stdio};
 
 use serde_json::Value;
 
-use crate::common::{run, stderr};
+use crate::common::{run, sonard, stderr, wait_until};
 
 /// Inner sides of the room, metres.
 const SIDES_M: [f64; 2] = [2.8, 2.3];
@@ -165,6 +165,39 @@ fn survey_states_what_is_missing() {
         succeeds(&["survey", &logs[0], &logs[1], "--out", out, "--max-scenes", "5000"]);
     }
     let [resumed, whole] = [&out, &whole]
+        .map(|out| fs::read_to_string(Path::new(out).join("survey.json")).expect("a survey"));
+    assert_eq!(resumed, whole);
+    assert!(!unfinished.exists());
+}
+
+#[test]
+fn killed_survey_continues() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let logs = sweeps(folder.path());
+    let [killed, whole] = ["killed", "whole"].map(|name| path(folder.path(), name));
+    let arguments = |out: &str| {
+        let mut arguments = vec!["survey".to_owned(), "--out".to_owned(), out.to_owned()];
+        arguments.extend(logs.clone());
+        arguments
+    };
+    let unfinished = Path::new(&killed).join("unfinished.jsonl");
+    let of_killed = arguments(&killed);
+    let of_killed: Vec<&str> = of_killed.iter().map(String::as_str).collect();
+    let mut survey = sonard(&of_killed);
+    let survey = survey.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    let mut survey = survey.expect("the program starts");
+    wait_until("a checkpoint", || unfinished.exists());
+    survey.kill().expect("it runs");
+    survey.wait().expect("its state");
+    assert!(!Path::new(&killed).join("scene.json").exists());
+    // The checkpoint is complete, and the same command continues from it.
+    let scored = fs::read_to_string(&unfinished).expect("a checkpoint");
+    assert_eq!((scored.lines().count(), scored.ends_with("]]\n")), (2, true));
+    for out in [&killed, &whole] {
+        let arguments = arguments(out);
+        succeeds(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+    }
+    let [resumed, whole] = [&killed, &whole]
         .map(|out| fs::read_to_string(Path::new(out).join("survey.json")).expect("a survey"));
     assert_eq!(resumed, whole);
     assert!(!unfinished.exists());

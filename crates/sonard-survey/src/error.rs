@@ -1,6 +1,7 @@
 //! Errors of a survey.
 
 use sonard_inverse::WorldError;
+use sonard_model::scene::SceneError;
 use thiserror::Error;
 
 /// Reason why no survey is possible.
@@ -15,6 +16,9 @@ pub enum SurveyError {
     /// Invalid sensor, air or options.
     #[error(transparent)]
     World(#[from] WorldError),
+    /// Invalid scene.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
     /// Invalid assumption.
     #[error("{name} is {value}: it must be {expected}")]
     Option {

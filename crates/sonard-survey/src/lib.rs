@@ -37,6 +37,7 @@ mod refine;
 mod relocate;
 mod report;
 mod result;
+mod room;
 mod rows;
 mod scores;
 mod search;
@@ -59,5 +60,6 @@ pub use result::{
     AlternativePlan, PieceStatus, ReadingCause, SearchEnd, Survey, SurveyedEnd, SurveyedPose,
     SurveyedWall, UnexplainedArc, WallPiece,
 };
+pub use room::unknown_room;
 pub use scores::PlanScores;
 pub use survey::{resume_survey, score_plan, survey};

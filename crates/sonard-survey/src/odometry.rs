@@ -1,12 +1,13 @@
 //! Relative poses by odometry, as a prior of consecutive poses.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sonard_model::geometry::{DVec2, Pose, wrap_180, wrap_pi};
 
 use crate::normal::NormalEquations;
 
 /// Error model of odometry between consecutive sweeps.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OdometrySigma {
     /// Standard deviation of the position per metre driven, metres.

@@ -1,7 +1,11 @@
 //! Progress and cancellation of a survey.
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 /// Stage of a survey.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", tag = "stage")]
 pub enum SurveyStage {
     /// Poses and virtual features from arcs.
     Course,
@@ -15,9 +19,10 @@ pub enum SurveyStage {
 }
 
 /// Progress of a survey.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SurveyProgress {
     /// Current stage.
+    #[serde(flatten)]
     pub stage: SurveyStage,
     /// Number of scenes scored so far.
     pub scored_scenes: usize,

@@ -1,5 +1,6 @@
 //! Result of a survey.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sonard_model::{
     geometry::Pose,
@@ -8,7 +9,7 @@ use sonard_model::{
 use uuid::Uuid;
 
 /// Floor plan and poses that explain the readings of sweeps, with what they leave undetermined.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Survey {
     /// Walls of the best plan, in the frame of the first sweep's pose.
     pub walls: Vec<SurveyedWall>,
@@ -36,7 +37,7 @@ pub struct Survey {
 }
 
 /// Wall of a plan.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SurveyedWall {
     /// Name in the scene.
     pub id: String,
@@ -55,7 +56,7 @@ pub struct SurveyedWall {
 }
 
 /// End of a wall.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SurveyedEnd {
     /// Position, metres.
     pub at_m: [f64; 2],
@@ -64,7 +65,7 @@ pub struct SurveyedEnd {
 }
 
 /// Stretch of a wall with one status.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct WallPiece {
     /// First end, metres.
     pub from_m: [f64; 2],
@@ -75,7 +76,9 @@ pub struct WallPiece {
 }
 
 /// Knowledge of a stretch of wall.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum PieceStatus {
     /// Inside the Fresnel zone of a mirror reflection by which an arc is explained, on a wall that
@@ -88,7 +91,7 @@ pub enum PieceStatus {
 }
 
 /// Pose of a sweep.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SurveyedPose {
     /// Scan of the sweep.
     pub scan: Uuid,
@@ -104,7 +107,7 @@ pub struct SurveyedPose {
 }
 
 /// Arc that the plan does not explain.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct UnexplainedArc {
     /// Index of the sweep.
     pub sweep: usize,
@@ -117,7 +120,7 @@ pub struct UnexplainedArc {
 }
 
 /// Cause of a reading in the plan.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ReadingCause {
     /// A single mirror reflection.
@@ -133,7 +136,7 @@ pub enum ReadingCause {
 }
 
 /// Plan that explains the readings nearly as well.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct AlternativePlan {
     /// Walls as pairs of ends, metres.
     pub walls: Vec<[[f64; 2]; 2]>,
@@ -144,7 +147,7 @@ pub struct AlternativePlan {
 }
 
 /// Reason why a search ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SearchEnd {
     /// All arcs are explained and no move gains.

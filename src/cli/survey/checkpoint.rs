@@ -1,9 +1,15 @@
-//! Checkpoint file of a survey that ended early, kept in the output folder.
+//! Checkpoint file of a survey that runs or ended early, kept in the output folder.
 //!
 //! The first line identifies the survey, the second has the scores of the plans tried so far. The
 //! same command continues from them and gives the result of an uninterrupted survey.
 
-use std::{fs, io, path::Path};
+use std::{
+    fs, io,
+    path::Path,
+    sync::mpsc::{RecvTimeoutError, channel},
+    thread,
+    time::Duration,
+};
 
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +18,7 @@ use crate::{
     cli::{
         Failure, Outcome,
         digest::digest,
-        output::{Overwrite, Product},
+        output::{Overwrite, Product, make_folder},
     },
     survey::{PlanScores, SurveyOptions},
 };
@@ -82,7 +88,7 @@ fn read(text: &str, head: &Head) -> Result<PlanScores, String> {
     Ok(entries.into_iter().collect())
 }
 
-/// Writes the scores of a survey that ended early.
+/// Writes the scores of a survey, as a whole or not at all.
 ///
 /// # Errors
 ///
@@ -96,6 +102,41 @@ pub(super) fn save(
     let lines = [serde_json::to_string(head), serde_json::to_string(&scores.entries())];
     let lines = lines.map(|line| line.unwrap_or_default() + "\n");
     overwrite.save(&folder.join(NAME), HEAD_KEYS, lines.concat().as_bytes())
+}
+
+/// Longest time between saved checkpoints.
+const LONGEST_INTERVAL: Duration = Duration::from_secs(30);
+
+/// Runs a search and saves its scores meanwhile, after 1, 2, 4, ... seconds, and every 30 seconds
+/// then. A write error ends the saving with a warning; the search continues.
+pub(super) fn while_saving<T>(
+    folder: &Path,
+    overwrite: Overwrite,
+    head: &Head,
+    scores: &PlanScores,
+    search: impl FnOnce() -> T,
+) -> T {
+    let (running, is_running) = channel::<()>();
+    thread::scope(|scope| {
+        scope.spawn(move || {
+            let mut interval = Duration::from_secs(1);
+            while is_running.recv_timeout(interval) == Err(RecvTimeoutError::Timeout) {
+                let saved =
+                    make_folder(folder).and_then(|()| save(folder, overwrite, head, scores));
+                if saved.is_err() {
+                    notice!(
+                        "warning: {}: checkpoints can't be written: a killed survey begins again",
+                        folder.join(NAME).display()
+                    );
+                    break;
+                }
+                interval = (2 * interval).min(LONGEST_INTERVAL);
+            }
+        });
+        // Dropped at the end of the search, also by a panic.
+        let _running = running;
+        search()
+    })
 }
 
 /// Deletes the file of a survey that is complete; a file of another kind remains.
