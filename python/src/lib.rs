@@ -23,6 +23,7 @@ mod scene;
 mod sense;
 mod sensor;
 mod status;
+mod survey;
 mod trace;
 
 /// The compiled part of `sonard`.
@@ -46,6 +47,7 @@ mod _sonard {
         scene::Scene,
         sense::{compare, find_features},
         sensor::Sensor,
+        survey::survey,
     };
 
     #[pymodule_init]

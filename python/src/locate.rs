@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use pyo3::{exceptions::PyValueError, prelude::*};
 use sonard::inverse::{self, ParameterGroup};
-use sonard_model::{geometry::Pose, reading::PingStatus};
+use sonard_model::geometry::Pose;
 use uuid::Uuid;
 
 use crate::{
@@ -145,20 +145,7 @@ impl Locator {
                 .map_err(|error| new_error::<LogError>(py, &error.to_string(), ""));
         }
         let given = BeamReadings::from_python(readings, azimuths_deg)?;
-        let us_per_m = 2e6 / self.world.air.sound_speed_m_s();
-        let beams: Vec<inverse::SweepFiring> = given
-            .beams
-            .into_iter()
-            .filter_map(|(azimuth_deg, status, range_m)| {
-                let outcome = match status {
-                    PingStatus::Echo => inverse::FiringOutcome::Echo { tof_us: range_m * us_per_m },
-                    PingStatus::NoEcho => inverse::FiringOutcome::NoEcho,
-                    PingStatus::MinRange => inverse::FiringOutcome::BelowMinRange,
-                    _ => return None,
-                };
-                Some(inverse::SweepFiring { azimuth_deg, outcome })
-            })
-            .collect();
+        let beams = given.firings(self.world.air.sound_speed_m_s());
         if beams.len() < MIN_BEAMS {
             return Err(PyValueError::new_err(format!(
                 "{} usable readings: at least {MIN_BEAMS} are required",

@@ -223,7 +223,7 @@ impl Scan {
 
     /// Air of the session.
     #[getter]
-    fn air(&self, py: Python<'_>) -> PyResult<Air> {
+    pub(crate) fn air(&self, py: Python<'_>) -> PyResult<Air> {
         let air = acoustics::Air::try_from(&self.session_of(py)?.air);
         let air = air.map_err(|error| new_error::<LogError>(py, &error.to_string(), ""))?;
         Ok(air.into())
@@ -319,7 +319,7 @@ impl Scan {
         Py::new(py, self.scene(py)?.ok_or_else(none)?)
     }
 
-    fn options(&self, py: Python<'_>) -> PyResult<Options> {
+    pub(crate) fn options(&self, py: Python<'_>) -> PyResult<Options> {
         let Some(model) = &self.session_of(py)?.model else { return Ok(Options::default()) };
         model.options().ok_or_else(|| {
             let message = format!("the logged model ({}) cannot be reconstructed", model.engine);

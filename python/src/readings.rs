@@ -1,6 +1,7 @@
 //! Conversion of readings passed by the user.
 
 use pyo3::{exceptions::PyValueError, prelude::*};
+use sonard::inverse::{FiringOutcome, SweepFiring};
 use sonard_model::reading::PingStatus;
 
 use crate::{arrays, model::predict::full_turn, status};
@@ -49,6 +50,21 @@ impl BeamReadings {
             usable.then_some((azimuth_deg, status, range_m))
         });
         Ok(Self { beams: beams.collect() })
+    }
+
+    /// Firings with an outcome, their times of flight by the speed of sound.
+    pub(crate) fn firings(self, sound_speed_m_s: f64) -> Vec<SweepFiring> {
+        let us_per_m = 2e6 / sound_speed_m_s;
+        let firing = |(azimuth_deg, status, range_m)| {
+            let outcome = match status {
+                PingStatus::Echo => FiringOutcome::Echo { tof_us: range_m * us_per_m },
+                PingStatus::NoEcho => FiringOutcome::NoEcho,
+                PingStatus::MinRange => FiringOutcome::BelowMinRange,
+                _ => return None,
+            };
+            Some(SweepFiring { azimuth_deg, outcome })
+        };
+        self.beams.into_iter().filter_map(firing).collect()
     }
 }
 

@@ -43,9 +43,24 @@ from ._sonard import (
     image_sources,
     interpret,
     read_log,
+    survey,
 )
 from ._sonard import map as map
-from ._results import Calibration, Estimate, ImageSources, Map, Path, Peak, Reading, Trace
+from ._results import (
+    AlternativePlan,
+    Calibration,
+    Estimate,
+    ImageSources,
+    Map,
+    Path,
+    Peak,
+    Reading,
+    Survey,
+    SurveyedWall,
+    Trace,
+    UnexplainedArc,
+    WallPiece,
+)
 from ._status import Status
 
 # Without `map`, which would replace the built-in function in a star import.
@@ -55,6 +70,7 @@ __all__ = [
     "READING",
     "Air",
     "AirError",
+    "AlternativePlan",
     "ArrayError",
     "ArrayModel",
     "Calibration",
@@ -79,8 +95,12 @@ __all__ = [
     "SensorError",
     "SonardError",
     "Status",
+    "Survey",
+    "SurveyedWall",
     "TooManyPathsError",
     "Trace",
+    "UnexplainedArc",
+    "WallPiece",
     "__commit__",
     "__version__",
     "calibrate",
@@ -89,4 +109,5 @@ __all__ = [
     "image_sources",
     "interpret",
     "read_log",
+    "survey",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -257,3 +257,169 @@ class Calibration:
             f"<Calibration of {len(self.estimates)} figures by {self.readings} readings, "
             f"{self.explained:.0%} explained, within {1e3 * self.sigma_m:.1f} mm>"
         )
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class WallPiece:
+    """Stretch of a surveyed wall with one status."""
+
+    ends: NDArray[np.float64]
+    """Both ends, x and y in metres: shape (2, 2)."""
+    status: Literal["observed", "implied", "conjectured"]
+    """``"observed"`` by echoes of two sweeps or more, ``"implied"`` by the score, which is over 3 nats less without the
+    stretch, or ``"conjectured"``: the readings hardly depend on it."""
+
+    @property
+    def length_m(self) -> float:
+        """Length, metres."""
+        return float(np.hypot(*(self.ends[1] - self.ends[0])))
+
+    def __repr__(self) -> str:
+        return f"<WallPiece {self.status}, {self.length_m:.3f} m>"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class SurveyedWall:
+    """Wall of a surveyed room with its uncertainty."""
+
+    id: str
+    """Name of the wall in the scene."""
+    ends: NDArray[np.float64]
+    """Both ends, x and y in metres: shape (2, 2)."""
+    covariances_m2: NDArray[np.float64]
+    """Covariances of both ends, metres squared; ``nan`` for an end that is no corner: shape (2, 2, 2)."""
+    sigma_across_m: float
+    """Standard deviation of the position across the wall, at its middle, metres; ``nan`` if unknown."""
+    sigma_direction_deg: float
+    """Standard deviation of the direction, degrees; ``nan`` if unknown."""
+    evidence_nats: float
+    """Loss of score without the wall, nats."""
+    pieces: tuple[WallPiece, ...]
+    """Stretches by status, from the first end to the second."""
+
+    def length_m(self, status: Literal["observed", "implied", "conjectured"] | None = None) -> float:
+        """Length of all stretches of a status, by default of the wall, metres."""
+        return sum((piece.length_m for piece in self.pieces if status in (None, piece.status)), 0.0)
+
+    def __repr__(self) -> str:
+        return f"<SurveyedWall '{self.id}': {self.length_m():.3f} m, {self.length_m('observed'):.3f} m observed>"
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class AlternativePlan:
+    """Floor plan that explains the readings nearly as well as the best one."""
+
+    walls: NDArray[np.float64]
+    """Both ends of each wall, x and y in metres: shape (walls, 2, 2)."""
+    score_difference: float
+    """Score relative to that of the best plan, nats."""
+    probability: float
+    """Probability among the best plan and all alternatives, 0 to 1."""
+
+    def __repr__(self) -> str:
+        return f"<AlternativePlan: {len(self.walls)} walls, probability {self.probability:.3f}>"
+
+
+@dataclass(frozen=True, slots=True)
+class UnexplainedArc:
+    """Neighbouring echoes of equal range that the plan does not explain."""
+
+    sweep: int
+    """Index of the sweep."""
+    azimuth_deg: float
+    """Azimuth of the middle, degrees from the heading."""
+    range_m: float
+    """Range, metres."""
+    beams: int
+    """Number of beams."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Survey:
+    """Result of ``survey``."""
+
+    scene: Scene
+    """Floor plan with the poses ``stop-1``, ``stop-2``, ..., without conjectured stretches unless ``closed``."""
+    poses: NDArray[np.float64]
+    """Poses of the sweeps in the frame of the first one's odometry, x and y in metres, heading in degrees: shape
+    (sweeps, 3)."""
+    sigmas: NDArray[np.float64]
+    """Standard deviations of the poses, 0 for the first, ``nan`` if unknown: shape (sweeps, 3)."""
+    equivalent: tuple[NDArray[np.float64], ...]
+    """Other poses of each sweep, from which the room looks alike: shapes (poses, 3)."""
+    scans: tuple[str, ...]
+    """Identifiers of the scans."""
+    walls: tuple[SurveyedWall, ...]
+    """Walls with their uncertainty and status."""
+    alternatives: tuple[AlternativePlan, ...]
+    """Other plans within 10 nats, most probable first."""
+    probability: float
+    """Probability of the plan among the alternatives and itself, 0 to 1."""
+    score: float
+    """Logarithm of the likelihood of the readings, less the price of the walls, nats."""
+    end: Literal["complete", "unexplained_arcs", "budget", "cancelled"]
+    """Reason why the search ended: all arcs are explained, or some remain although no change gains; the budget of
+    ``max_scenes`` is spent, or the search was cancelled."""
+    arcs: int
+    """Number of arcs in all sweeps."""
+    unexplained: tuple[UnexplainedArc, ...]
+    """Arcs that the plan does not explain."""
+    causes: tuple[tuple[Literal["first", "multiple", "edge", "no_range", "unexplained"], ...], ...]
+    """Cause of each reading in order of azimuth, by sweep: one reflection, several, an edge, a predicted missing echo
+    or minimum range, or none."""
+    scored_scenes: int
+    """Number of floor plans whose readings were predicted."""
+    reflectance: float
+    """Amplitude reflection coefficient assumed for all walls."""
+
+    @classmethod
+    def _from_dict(cls, found: dict[str, Any], scene: Scene) -> Survey:
+        poses = found["poses"]
+        nothing = [None, None]
+        sigmas = [[*(pose["sigma_m"] or nothing), pose["sigma_heading_deg"]] for pose in poses]
+        return cls(
+            scene=scene,
+            poses=_pose_rows([pose["pose"] for pose in poses]),
+            sigmas=np.array(sigmas, dtype=float),
+            equivalent=tuple(_pose_rows(pose["equivalent"]) for pose in poses),
+            scans=tuple(pose["scan"] for pose in poses),
+            walls=tuple(_surveyed_wall(wall) for wall in found["walls"]),
+            alternatives=tuple(
+                AlternativePlan(np.array(plan["walls"], dtype=float), plan["score_difference"], plan["probability"])
+                for plan in found["alternatives"]
+            ),
+            probability=found["probability"],
+            score=found["score"],
+            end=found["end"],
+            arcs=found["arcs"],
+            unexplained=tuple(UnexplainedArc(arc["sweep"], arc["azimuth_deg"], arc["range_m"], arc["beams"]) for arc in found["unexplained"]),
+            causes=tuple(tuple(causes) for causes in found["causes"]),
+            scored_scenes=found["scored_scenes"],
+            reflectance=found["reflectance"],
+        )
+
+    def __repr__(self) -> str:
+        explained = self.arcs - len(self.unexplained)
+        return (
+            f"<Survey of {len(self.poses)} sweeps: {len(self.walls)} walls, {explained} of {self.arcs} arcs explained, "
+            f"{self.end.replace('_', ' ')}>"
+        )
+
+
+def _pose_rows(poses: list[dict[str, float]]) -> NDArray[np.float64]:
+    rows = [[pose["x_m"], pose["y_m"], pose["heading_deg"]] for pose in poses]
+    return np.array(rows, dtype=float).reshape(-1, 3)
+
+
+def _surveyed_wall(wall: dict[str, Any]) -> SurveyedWall:
+    ends = [wall["from"], wall["to"]]
+    covariances = [end["covariance_m2"] or [np.nan] * 3 for end in ends]
+    return SurveyedWall(
+        id=wall["id"],
+        ends=np.array([end["at_m"] for end in ends]),
+        covariances_m2=np.array([[[xx, xy], [xy, yy]] for xx, xy, yy in covariances]),
+        sigma_across_m=np.nan if wall["sigma_across_m"] is None else wall["sigma_across_m"],
+        sigma_direction_deg=np.nan if wall["sigma_direction_deg"] is None else wall["sigma_direction_deg"],
+        evidence_nats=wall["evidence_nats"],
+        pieces=tuple(WallPiece(np.array([piece["from_m"], piece["to_m"]]), piece["status"]) for piece in wall["pieces"]),
+    )

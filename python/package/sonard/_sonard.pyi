@@ -1,12 +1,12 @@
 import pathlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from os import PathLike
 from typing import Any, ClassVar, Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._results import Calibration, ImageSources, Map, Path, Reading, Trace
+from ._results import Calibration, ImageSources, Map, Path, Reading, Survey, Trace
 
 __all__ = [
     "ARRAY_READING",
@@ -41,6 +41,7 @@ __all__ = [
     "interpret",
     "map",
     "read_log",
+    "survey",
 ]
 
 __commit__: str
@@ -449,6 +450,21 @@ def calibrate(
     max_initial_error_m: float = 0.1,
     search: Literal["thorough", "quick", "furnished"] = "thorough",
 ) -> Calibration: ...
+def survey(
+    sweeps: Log | Scan | Sequence[Log | Scan] | ArrayLike,
+    poses: ArrayLike | None = None,
+    *,
+    azimuths_deg: ArrayLike | None = None,
+    sensor: Sensor | str | None = None,
+    air: Air | None = None,
+    odometry: tuple[float, float] | None = (0.05, 5.0),
+    square: bool = False,
+    max_range_m: float = 5.0,
+    reflectance: float = 0.97,
+    max_scenes: int = 30000,
+    closed: bool = False,
+    progress: Callable[[dict[str, Any]], object] | None = None,
+) -> Survey: ...
 def compare(scans: Log | Scan | Iterable[Log | Scan]) -> dict[str, Any]: ...
 def interpret(
     scans: Log | Scan | Iterable[Log | Scan],
