@@ -181,7 +181,10 @@ async fn find_daemon(
 ) -> Result<RemoteDevice, Failure> {
     let notify = |line: &str| notice!("{line}");
     let (daemon, status) = RemoteDevice::open(args.at.client()?, interrupts, notify).await?;
-    check_scene(status.scene.as_ref(), &plan.scene)?;
+    let is_unknown = plan.keys.place.scene.is_empty() && status.scene.is_none();
+    if !is_unknown {
+        check_scene(status.scene.as_ref(), &plan.scene)?;
+    }
     adopt::adopt(plan, &daemon, &status)?;
     Ok(daemon)
 }

@@ -149,6 +149,11 @@ impl MockWorldArgs {
             .map_err(|error| Failure::input(error, "give a simpler scene"))
     }
 
+    /// Returns `true` if the true scene is given.
+    pub(super) const fn has_truth(&self) -> bool {
+        self.truth.is_some()
+    }
+
     /// Motor steps per revolution.
     pub(super) const fn steps_per_revolution(&self) -> u16 {
         self.steps_per_revolution

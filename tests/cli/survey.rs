@@ -202,3 +202,65 @@ fn killed_survey_continues() {
     assert_eq!(resumed, whole);
     assert!(!unfinished.exists());
 }
+
+#[test]
+fn collected_scans_of_unknown_room_give_scene_for_all_verbs() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [w, d] = SIDES_M;
+    let room = serde_json::json!({
+        "name": "room", "materials": {"wall": {"reflectance": 0.97}},
+        "walls": [{"id": "wall", "polyline": [[0, 0], [w, 0], [w, d], [0, d]], "closed": true, "material": "wall"}],
+    });
+    let at = |name: &str| path(folder.path(), name);
+    let [truth, plan, out, surveyed] = ["truth.json", "plan.toml", "out", "surveyed"].map(at);
+    fs::write(&truth, room.to_string()).expect("written");
+    let stops = STOPS[..3].iter().map(|[x, y, deg]| format!("\"{x},{y},{deg}\""));
+    let stops = stops.collect::<Vec<_>>().join(", ");
+    let keys =
+        format!("[place]\nscene = \"\"\n[poses]\nlist = [{stops}]\n[sensor]\nmax_range_m = 4\n");
+    fs::write(&plan, keys).expect("written");
+    // Only the mock needs a room.
+    let without = run(&["collect", &plan, "--mock", "--out", &out]);
+    assert_eq!(without.status.code(), Some(2));
+    assert!(stderr(&without).contains("--truth"), "{}", stderr(&without));
+    succeeds(&["collect", &plan, "--mock", "--truth", &truth, "--out", &out]);
+    let scans = at("out/scans");
+    succeeds(&["survey", &scans, "--max-range", "4", "--out", &surveyed]);
+
+    let scene = at("surveyed/scene.json");
+    succeeds(&["scene", "check", &scene]);
+    let logs: Vec<String> =
+        (1..=3).map(|pose| at(&format!("out/scans/p00{pose}-r01.jsonl"))).collect();
+    let logs: Vec<&str> = logs.iter().map(String::as_str).collect();
+    let lines = |arguments: &[&str]| -> Vec<Value> {
+        let printed = succeeds(&[arguments, &logs, &["--json", "--scene", &scene]].concat());
+        printed.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect()
+    };
+    let compared = lines(&["compare"]);
+    assert_eq!(compared.len(), 3);
+    for compared in compared {
+        let [agree, both] = ["agree", "both_echo"].map(|name| compared[name].as_f64().expect(name));
+        assert!(both > 150.0 && agree / both > 0.97, "{compared}");
+    }
+    let fitted = lines(&["calibrate", "--fit", "pose,walls"]);
+    let walls: Vec<_> = fitted
+        .iter()
+        .filter(|line| line["name"].as_str().is_some_and(|name| name.starts_with("wall ")))
+        .collect();
+    assert_eq!(walls.len(), 4, "{fitted:?}");
+    for wall in walls {
+        assert!(wall["change"].as_f64().expect("metres").abs() < 0.003, "{wall}");
+    }
+    let located = lines(&["locate"]);
+    for [x, y, _] in &STOPS[..3] {
+        let is_near = |line: &Value| {
+            let [x_m, y_m] = ["x_m", "y_m"].map(|name| line[name].as_f64().expect("metres"));
+            (x_m - x).hypot(y_m - y) < 0.01
+        };
+        assert!(located.iter().any(is_near), "{x} {y}: {located:?}");
+    }
+    let predicted = at("predicted.jsonl");
+    succeeds(&["predict", logs[0], "--scene", &scene, "-o", &predicted]);
+    succeeds(&["map", &predicted, "--out", &at("map")]);
+    assert!(fs::read(at("map/map.pgm")).expect("a map").starts_with(b"P5"));
+}

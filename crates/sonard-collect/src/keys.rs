@@ -143,7 +143,8 @@ pub struct AskKeys {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SceneKeys {
-    /// Scene file, or the name of a shipped scene.
+    /// Scene file, or the name of a shipped scene. Empty for an unknown room, whose scans have
+    /// nothing to agree with: max_unexplained_share is then not checked.
     pub scene: String,
 }
 

@@ -34,10 +34,17 @@ pub(super) fn load(args: &Args) -> Result<CollectionPlan, Failure> {
     for setting in &args.set {
         layers = layers.with_option("--set", setting).map_err(|error| failure_from(&error))?;
     }
-    let keys = layers.clone().into_keys().map_err(|error| failure_from(&error))?;
+    let mut keys: CollectionKeys =
+        layers.clone().into_keys().map_err(|error| failure_from(&error))?;
     let at = Origins { layers: &layers, file: &name };
-    let scene_text = scene_file::read(&keys.place.scene)?;
-    let scene = Arc::new(scene_file::load(&keys.place.scene)?);
+    let (scene_text, scene) = match keys.place.scene.as_str() {
+        "" => {
+            keys.checks.max_unexplained_share = 1.0;
+            unknown_room(args)?
+        }
+        name => (scene_file::read(Path::new(name))?, scene_file::load(Path::new(name))?),
+    };
+    let scene = Arc::new(scene);
     let sensor = sensor(load_sensor(&keys.sensor.sensor)?, &keys, &at)?;
     let plan = scan_plan(&keys, &at)?;
     let poses = poses(&keys, &scene, &at)?;
@@ -68,6 +75,19 @@ pub(super) fn load(args: &Args) -> Result<CollectionPlan, Failure> {
         layers,
         name,
     })
+}
+
+/// Text and scene of a room without known walls.
+fn unknown_room(args: &Args) -> Result<(String, Scene), Failure> {
+    if (args.mock || args.emulator) && !args.world.has_truth() {
+        return Err(Failure::input(
+            "the scene is empty: nothing reflects sound on the mock",
+            "give the true room with --truth",
+        ));
+    }
+    let room = Scene::builder("unknown room");
+    let scene = room.build().map_err(|error| Failure::input(error, "report this as a bug"))?;
+    Ok((room.text(), scene))
 }
 
 /// Validates combinations of keys.
