@@ -32,6 +32,7 @@ mod soak;
 mod stderr;
 mod strangers;
 mod supervision;
+mod survey;
 mod systemd;
 mod thermometer;
 mod viewpoint;

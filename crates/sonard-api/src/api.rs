@@ -24,6 +24,7 @@ mod settings;
 mod setup;
 mod simulation;
 mod status;
+mod survey;
 
 pub use access::{AccessReport, WriteAccess};
 pub use air::{AirOrder, AirStatus};
@@ -48,6 +49,10 @@ pub use simulation::{RangerReading, SimulationReport};
 pub use status::{
     ConfigurationReport, InForce, LogStatus, Pending, ScanProgress, ScanningReport, Status,
     SubscriberReport,
+};
+pub use survey::{
+    MAX_SURVEY_SCENES, MAX_SURVEYED_SWEEPS, MAX_UPLOADED_BEAMS, SurveyEvent, SurveyReport,
+    SurveyRequest, UploadedSweep,
 };
 
 // Types of the API that the model crates define.

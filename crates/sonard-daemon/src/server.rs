@@ -83,8 +83,9 @@ pub(crate) struct Api {
     playground: Option<Arc<Path>>,
     /// Limits concurrent predictions of beams and previews.
     predicting: Arc<Semaphore>,
-    /// Limits concurrent localizations.
-    locating: Arc<Semaphore>,
+    /// Limits concurrent localizations and surveys.
+    computing: Arc<Semaphore>,
+    surveying: routes::RunningSurvey,
     /// Limits concurrent reads of scan pieces.
     reading: Arc<Semaphore>,
     scene: CachedJson<Scene>,
@@ -132,7 +133,8 @@ impl Server {
                 .then(|| sonard_api::fleet::watch_fleet(fleet, daemon.supervisor())),
             playground: keys.playground.as_deref().map(|folder| Path::new(folder).into()),
             predicting: Arc::new(Semaphore::new(1)),
-            locating: Arc::new(Semaphore::new(1)),
+            computing: Arc::new(Semaphore::new(1)),
+            surveying: routes::RunningSurvey::default(),
             reading: Arc::new(Semaphore::new(1)),
             scene: CachedJson::default(),
             session: CachedJson::default(),

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Deserializer, de::Error as _};
 use serde_json::Value;
 
-/// Names of the body fields that hold lists of objects.
-const LISTS: [&str; 1] = ["steps"];
+/// Names of the body fields that hold lists.
+const LISTS: [&str; 5] = ["steps", "scans", "sweeps", "azimuths_deg", "ranges_m"];
 
 /// Returns `true` if a request body contains a list where the API has none.
 ///

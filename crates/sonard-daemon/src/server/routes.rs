@@ -14,14 +14,17 @@ mod pieces;
 mod playground;
 mod preview;
 mod report;
+mod results;
 mod scans;
 mod scene;
+mod survey;
 
 use axum::{extract::State, http::header, response::IntoResponse};
 use serde_json::Value;
 
 pub(super) use foxglove::FOXGLOVE;
 pub(super) use page::is_public;
+pub(super) use survey::RunningSurvey;
 
 use super::{Api, openapi::Route};
 
@@ -36,6 +39,7 @@ pub(super) fn endpoints() -> Vec<Route> {
     endpoints.extend(scans::endpoints());
     endpoints.extend(findings::endpoints());
     endpoints.extend(location::endpoints());
+    endpoints.extend(survey::endpoints());
     endpoints.extend(preview::endpoints());
     endpoints.extend(logs::endpoints());
     endpoints.extend(metrics::endpoints());

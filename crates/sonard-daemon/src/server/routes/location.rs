@@ -2,19 +2,10 @@
 
 use std::{
     io,
-    num::NonZero,
     sync::{Arc, PoisonError},
-    thread,
-    time::Duration,
 };
 
-use axum::{
-    body::{Body, Bytes},
-    extract::State,
-    http::{StatusCode, header},
-    response::{IntoResponse as _, Response},
-};
-use futures_util::stream;
+use axum::{extract::State, http::StatusCode, response::Response};
 use serde::Deserialize;
 use serde_json::json;
 use sonard_api::Location;
@@ -23,15 +14,11 @@ use sonard_inverse::{
 };
 use sonard_log::{LogIndex, ScanSpan};
 use sonard_records::Session;
-use tokio::{
-    sync::{OwnedSemaphorePermit, mpsc},
-    task::JoinHandle,
-    time::timeout,
-};
 use uuid::Uuid;
 
 use super::{
     findings::read,
+    results::{acquire_permit, stream_results},
     scans::{find_written, in_history, internal_error, load_scene, scan_not_found},
 };
 use crate::server::{
@@ -42,8 +29,6 @@ use crate::server::{
 
 /// Maximum number of scans of a course.
 const MAX_SCANS: usize = 500;
-/// Maximum wait for other localizations to finish.
-const LOCATE_TIMEOUT: Duration = Duration::from_secs(5);
 
 #[derive(Debug, Clone, Copy, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -198,71 +183,6 @@ fn scans_between(
         scans.reverse();
         scans
     }))
-}
-
-/// Waits for permission to locate. Only one client at a time, because localization occupies
-/// processors for seconds.
-async fn acquire_permit(api: &Api) -> Result<OwnedSemaphorePermit, ApiError> {
-    let permit = timeout(LOCATE_TIMEOUT, Arc::clone(&api.locating).acquire_owned()).await;
-    permit.ok().and_then(Result::ok).ok_or_else(|| {
-        let help = "try again later: one client at a time";
-        ApiError::new(
-            StatusCode::SERVICE_UNAVAILABLE,
-            "localization is busy with another client",
-            help,
-        )
-    })
-}
-
-/// Runs `work` on a blocking thread and streams its results, while the client is connected.
-fn stream_results(
-    media: &'static str,
-    permit: OwnedSemaphorePermit,
-    work: impl FnOnce(&ResultSender) + Send + 'static,
-) -> Response {
-    let (sender, receiver) = mpsc::channel(1);
-    let working = tokio::task::spawn_blocking(move || {
-        let _permit = permit;
-        let results = ResultSender(sender);
-        // One processor remains free for the measurement.
-        let threads = thread::available_parallelism().map_or(1, NonZero::get).saturating_sub(1);
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.max(1)).build();
-        match pool {
-            Ok(pool) => pool.install(|| work(&results)),
-            Err(_) => work(&results),
-        }
-    });
-    let pieces = stream::try_unfold((receiver, working), next_piece);
-    ([(header::CONTENT_TYPE, media)], Body::from_stream(pieces)).into_response()
-}
-
-type PendingResults = (mpsc::Receiver<Bytes>, JoinHandle<()>);
-
-/// Returns the next result. A panic of the worker aborts the stream instead of ending it.
-async fn next_piece(
-    (mut receiver, working): PendingResults,
-) -> io::Result<Option<(Bytes, PendingResults)>> {
-    match receiver.recv().await {
-        Some(piece) => Ok(Some((piece, (receiver, working)))),
-        None => working.await.map(|()| None).map_err(io::Error::other),
-    }
-}
-
-/// Sender of results to the client.
-struct ResultSender(mpsc::Sender<Bytes>);
-
-impl ResultSender {
-    /// Sends a result; `None` if the client has disconnected.
-    fn send(&self, location: &Location, end: &str) -> Option<()> {
-        let line = serde_json::to_string(location).ok()? + end;
-        self.0.blocking_send(line.into()).ok()
-    }
-}
-
-impl FitObserver for ResultSender {
-    fn is_cancelled(&self) -> bool {
-        self.0.is_closed()
-    }
 }
 
 /// Scan with the scene and model needed to locate it.
