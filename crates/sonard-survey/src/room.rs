@@ -11,8 +11,8 @@ use sonard_model::{
 
 use crate::error::SurveyError;
 
-/// World without walls. Its maximum range is `max_range_m` or the sensor's, whichever is shorter;
-/// longer ranges count as no echo.
+/// World without walls. Its maximum range is the shortest of `max_range_m` and those of options and
+/// sensor; longer ranges count as no echo.
 ///
 /// # Errors
 /// A maximum range outside of 0.3 to 20 m.
@@ -27,6 +27,7 @@ pub fn unknown_room(
         return Err(SurveyError::Option { name, value: max_range_m, expected });
     }
     let scene = Arc::new(Scene::builder("unknown room").material("wall", 1.0).build()?);
-    let max_range_m = Some(max_range_m.min(sensor.max_range_m));
+    let measured_m = options.max_range_m.unwrap_or(sensor.max_range_m);
+    let max_range_m = Some(max_range_m.min(measured_m));
     Ok(World::new(scene, sensor, air, Options { max_range_m, ..options }))
 }

@@ -61,6 +61,7 @@ fn responses_match_the_openapi() {
         ("/v1/preview", json!({"sensor": {"preset": "polaroid-chirp"}})),
         ("/v1/sensor", json!({"threshold": 0.03, "gain": {"kind": "compensating"}})),
     ];
+    let bodies = [&bodies[..], &[("/v1/survey", surveyable())]].concat();
     let mut operations = 0;
     for (path, methods) in document["paths"].as_object().expect("paths") {
         for (method, operation) in methods.as_object().expect("methods") {
@@ -102,8 +103,17 @@ fn responses_match_the_openapi() {
             let (media, schema) = kinds
                 .find(|(media, _)| has_text(media))
                 .unwrap_or_else(|| panic!("{path}: {}", reply.head));
-            if media == "application/json" {
-                let faults = misfits(&schema["schema"], &document, &reply.json());
+            let values: Vec<Value> = match media.as_str() {
+                "application/json" => vec![reply.json()],
+                "application/x-ndjson" if path == "/v1/survey" => std::str::from_utf8(&reply.body)
+                    .expect("text")
+                    .lines()
+                    .map(|line| serde_json::from_str(line).expect("JSON"))
+                    .collect(),
+                _ => Vec::new(),
+            };
+            for value in values {
+                let faults = misfits(&schema["schema"], &document, &value);
                 assert_eq!(faults, Vec::<String>::new(), "{method} {path}");
             }
         }
@@ -209,6 +219,23 @@ fn responses_deserialize() {
     check(&format!("{scan}/beams/7"), same::<Beam>);
     check(&format!("{scan}/scene"), same::<FloorPlan>);
     daemon.stop();
+}
+
+/// Two sweeps of perpendicular echoes in a rectangular room, with a budget that ends at once.
+fn surveyable() -> Value {
+    let sweep = |x_m: f64| {
+        let walls_m = [2.8 - x_m, 1.5, x_m, 0.8];
+        let azimuths_deg: Vec<f64> = (0..400).map(|beam| 0.9 * f64::from(beam)).collect();
+        let range_m = |azimuth_deg: &f64| {
+            let side = (azimuth_deg / 90.0).round();
+            let is_near = (azimuth_deg - 90.0 * side).abs() < 8.0;
+            is_near.then(|| walls_m[side as usize % 4])
+        };
+        let ranges_m: Vec<Option<f64>> = azimuths_deg.iter().map(range_m).collect();
+        let pose = json!({"x_m": x_m, "y_m": 0.8, "heading_deg": 0.0});
+        json!({"pose": pose, "azimuths_deg": azimuths_deg, "ranges_m": ranges_m})
+    };
+    json!({"sweeps": [sweep(1.0), sweep(1.4)], "max_scenes": 100})
 }
 
 /// Both forms of a stream follow the document.

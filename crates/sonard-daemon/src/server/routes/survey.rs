@@ -59,7 +59,8 @@ pub(super) fn endpoints() -> Vec<Route> {
             cancel,
             "End the running survey early; its response ends with the best plan so far",
         )
-        .responds::<Accepted>(200, "Ending"),
+        .responds::<Accepted>(200, "Ending")
+        .responds::<Problem>(409, "No survey is running"),
     ]
 }
 
