@@ -9,6 +9,7 @@ mod fleet;
 mod pictures;
 pub(crate) mod pointer;
 mod readable;
+mod surveyed;
 pub(crate) mod view;
 mod viewpoints;
 mod workbench;

@@ -52,7 +52,7 @@ fn select_beam(browser: &Browser, index: u32) {
 }
 
 /// Waits until an element contains a text.
-fn until_has(browser: &Browser, selector: &str, text: &str) {
+pub(super) fn until_has(browser: &Browser, selector: &str, text: &str) {
     browser.until(&format!("document.querySelector({selector:?}).textContent.includes({text:?})"));
 }
 

@@ -46,6 +46,12 @@ export async function enterToken() {
 /** Returns the JSON of a response; opens the token dialog on 401. @param {string} path @param {Request} [request] */
 export const requestJson = async (path, request = {}) => (await fetchAuthorized(path, request)).json();
 
+/** Calls `onLine` with each line of a JSON Lines response. @param {string} path @param {Request} request @param {(line: any) => void} onLine */
+export async function requestLines(path, request, onLine) {
+  const response = await fetchAuthorized(path, request);
+  await readLines(response.body, (line) => onLine(JSON.parse(line)));
+}
+
 /** Returns the body of a response as a file. @param {string} path @returns {Promise<Blob>} */
 export const requestFile = async (path) => (await fetchAuthorized(path, {})).blob();
 
@@ -107,16 +113,29 @@ async function errorOf(response) {
   return new ApiError(response.status, { error: response.statusText, help: "", ...problem });
 }
 
+/** Reads server-sent events; aborts `stop` if none arrives in time. */
 async function readEvents(body, onLine, stop) {
+  let timeout = 0;
+  const wait = () => {
+    clearTimeout(timeout);
+    timeout = setTimeout(() => stop.abort(), STREAM_TIMEOUT_MS);
+  };
+  wait();
+  const onEvent = (line) => line.startsWith("data: ") && onLine(JSON.parse(line.slice(6)));
+  await readLines(body, onEvent, wait).finally(() => clearTimeout(timeout));
+}
+
+/** Calls `onLine` with each complete line of a body, and `onPart` after each part of it. */
+async function readLines(body, onLine, onPart = () => {}) {
   const reader = body.pipeThrough(new TextDecoderStream()).getReader();
   let rest = "";
   for (;;) {
-    const timeout = setTimeout(() => stop.abort(), STREAM_TIMEOUT_MS);
-    const { value, done } = await reader.read().finally(() => clearTimeout(timeout));
+    const { value, done } = await reader.read();
     if (done) return;
+    onPart();
     const lines = (rest + value).split("\n");
     rest = lines.pop();
-    for (const line of lines) if (line.startsWith("data: ")) onLine(JSON.parse(line.slice(6)));
+    for (const line of lines) onLine(line);
   }
 }
 

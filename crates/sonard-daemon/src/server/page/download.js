@@ -62,7 +62,8 @@ function captionOf(plan, shown) {
   return { title, about, badge: provenanceLabel(session?.provenance), counts };
 }
 
-function save(blob, name) {
+/** Saves a file by the browser. @param {Blob} blob @param {string} name */
+export function save(blob, name) {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(blob);
   link.download = name;

@@ -15,6 +15,7 @@ import { Scan } from "./scan.js";
 import { pollStatus } from "./status.js";
 import { Strip } from "./strip.js";
 import { Summary } from "./summary.js";
+import { Surveyor } from "./survey.js";
 import { BeamTable } from "./table.js";
 import { addTools } from "./tools.js";
 import { EchoTrace } from "./trace.js";
@@ -82,6 +83,11 @@ const explanations = new Explanations(byId("hypotheses"), plan, {
   propose: (change) => nextScan.propose(change),
 });
 const locator = new Locator(byId("location"), plan, (change) => nextScan.propose(change));
+const surveyor = new Surveyor(byId("surveys"), plan, {
+  scans: () => history.scans,
+  shown: () => history.shown,
+  onPlan: () => loadScene(),
+});
 addDownloads(byId("downloads"), plan, {
   scan: () => shown,
   log: (id) => history.logOf(id),
@@ -324,12 +330,18 @@ async function readNewest() {
 /** Loads the scene of the shown scan: the current one, or the one in the scan's log. */
 async function loadScene() {
   const scan = shown;
+  plan.surveyed = surveyor.scene;
+  if (surveyor.scene) return setScene(surveyor.scene);
   const recorded = scan?.session?.scene?.sha256;
   if (recorded && recorded === plan.scene?.sha256) return;
   const unknown = (error) => (error.status === 404 ? null : undefined);
   let scene = await requestJson("/v1/scene").catch(unknown);
   if (recorded && scene?.sha256 !== recorded) scene = (await requestJson(`/v1/scans/${scan.id}/scene`).catch(unknown)) ?? scene;
   if (scene === undefined || scan !== shown || scene?.sha256 === plan.scene?.sha256) return;
+  setScene(scene);
+}
+
+function setScene(scene) {
   plan.scene = scene;
   changed = true;
   setText(byId("floor-title"), scene ? `Floor plan: ${scene.name}` : "Floor plan");

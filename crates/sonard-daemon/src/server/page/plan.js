@@ -48,6 +48,8 @@ export class Plan {
     /** Suspends automatic fitting while a handle is dragged. */
     this.held = false;
     this.scene = null;
+    /** Surveyed floor plan that replaces the scene. */
+    this.surveyed = null;
     this.scan = null;
     this.selected = null;
     this.latest = null;
@@ -217,8 +219,9 @@ export class Plan {
     return PEN_NAMES.filter((name) => this.layers.some((layer) => layer.used.has(name)));
   }
 
-  /** Returns `true` if the loaded scene is the one that the scan was recorded in. */
+  /** Returns `true` if the loaded scene is the one that the scan was recorded in, or a surveyed one. */
   sceneFits() {
+    if (this.surveyed) return true;
     const recorded = this.scan?.session?.scene?.sha256;
     return this.scene && (!recorded || recorded === this.scene.sha256);
   }

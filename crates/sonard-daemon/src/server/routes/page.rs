@@ -83,6 +83,7 @@ static ASSETS: &[Asset] = &assets![
     "status.js" SCRIPT,
     "strip.js" SCRIPT,
     "summary.js" SCRIPT,
+    "survey.js" SCRIPT,
     "svg.js" SCRIPT,
     "table.js" SCRIPT,
     "timeline.js" SCRIPT,
