@@ -45,14 +45,14 @@ fn surveyed_plan_takes_the_place_of_the_scene() {
     browser.until(COMPLETE);
     browser.until("document.querySelectorAll('#scans-list li').length === 3");
     let scene = browser.text("#floor-title");
-    let before = drawn_pixels(&browser, "above");
+    let before = drawn_pixels(&browser, "under");
     browser.click("#survey");
     until_has(&browser, "#survey", "Cancel");
     browser.until("!document.getElementById('use-plan').hidden");
     let text = browser.text("#surveyed");
     assert!(text.contains(" walls from 3 scans, ") && text.contains(" arcs explained"), "{text}");
     // Walls by status and poses are drawn and explained.
-    assert!(drawn_pixels(&browser, "above") > before + 500);
+    assert!(drawn_pixels(&browser, "under") > before + 500);
     for label in ["surveyed wall: observed", "surveyed pose", "95 % region of the pose"] {
         until_has(&browser, "#legend", label);
     }
@@ -65,7 +65,7 @@ fn surveyed_plan_takes_the_place_of_the_scene() {
     browser.click("#clear-survey");
     browser.until("document.getElementById('use-plan').hidden");
     browser.until_drawn();
-    assert_eq!(drawn_pixels(&browser, "above"), before);
+    assert_eq!(drawn_pixels(&browser, "under"), before);
     // A cancelled survey frees the daemon for the next one.
     browser.click("#survey");
     until_has(&browser, "#surveyed", "Surveying: ");

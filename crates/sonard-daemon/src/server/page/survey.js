@@ -94,7 +94,7 @@ export class Surveyor {
   }
 
   /** @param {any} layer @param {any} plan */
-  drawAbove(layer, plan) {
+  drawUnder(layer, plan) {
     if (!this.found) return;
     const { walls, poses } = this.found.survey;
     for (const { pieces } of walls) {
