@@ -125,6 +125,7 @@ pub(super) use crosstalk::{CrosstalkPaths, TransducerPose};
 pub use engine::PathEngine;
 pub use interactions::EchoPath;
 pub(super) use mirror_paths::MirrorPath;
+pub(super) use pattern::BoundedPattern;
 pub use prepare::Paths;
 pub use settings::{
     DEFAULT_MIN_AMPLITUDE, DEFAULT_REPEATED_CONTACT_RATIO, PathSettings, default_sensor_z_m,

@@ -1,6 +1,6 @@
 //! Simulator: joins an engine and a receiver to predict readings.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use thiserror::Error;
 
@@ -9,7 +9,7 @@ use super::{
     cost::TooCostly,
     lazy::{LazyArrivals, ReachEstimate},
     options::OutOfRange,
-    paths::{self, PathEngine},
+    paths::{self, BoundedPattern, PathEngine},
 };
 use crate::{
     acoustics::{Air, BeamPattern, Disc, Receiver, Sensor, SensorError},
@@ -60,24 +60,25 @@ pub enum ModelError {
 /// Predicts readings in a scene.
 pub struct Simulator {
     scene: Arc<Scene>,
-    ranger: RangerSetup,
+    ranger: Arc<RangerSetup>,
     engine: Box<dyn Engine>,
 }
 
 /// All inputs of predictions except the scene.
-#[derive(Clone)]
 struct RangerSetup {
     sensor: Sensor,
     air: Air,
     options: Options,
     receiver: Receiver,
     beam: BeamPattern,
+    /// The pattern with the bounds of [`paths`], computed for the first engine of that kind.
+    bounded: OnceLock<Arc<BoundedPattern>>,
     scatter_height_rad: f64,
-    expected: Arc<ReachEstimate>,
+    expected: ReachEstimate,
 }
 
 impl RangerSetup {
-    fn simulator(self, scene: Arc<Scene>) -> Result<Simulator, ModelError> {
+    fn simulator(self: Arc<Self>, scene: Arc<Scene>) -> Result<Simulator, ModelError> {
         check_height(&scene, &self.sensor)?;
         let engine = self.engine(&scene);
         Ok(Simulator { scene, ranger: self, engine })
@@ -90,7 +91,10 @@ impl RangerSetup {
                 let settings = path_settings(sensor, air, paths, receiver, self.scatter_height_rad);
                 let wave_number_per_m = settings.wave_number_per_m;
                 let face = sensor.face.map(|face| Disc { face, wave_number_per_m });
-                Box::new(self.path_engine(scene, face, settings))
+                let bounded = || Arc::new(BoundedPattern::new(beam.clone(), face));
+                let pattern = Arc::clone(self.bounded.get_or_init(bounded));
+                let engine = PathEngine::with_pattern(scene, pattern, face, settings);
+                Box::new(engine.through_nulls(receiver.needs_incidents()))
             }
             EngineOptions::Fan(fan) => {
                 let settings = fan_settings(sensor, air, fan, receiver);
@@ -101,16 +105,6 @@ impl RangerSetup {
                 Box::new(Cone::new(scene, cone.aperture_deg.unwrap_or_else(two_way_deg)))
             }
         }
-    }
-
-    fn path_engine(
-        &self,
-        scene: &Scene,
-        face: Option<Disc>,
-        settings: paths::PathSettings,
-    ) -> PathEngine {
-        let engine = PathEngine::new(scene, self.beam.clone(), face, settings);
-        engine.through_nulls(self.receiver.needs_incidents())
     }
 }
 
@@ -147,18 +141,27 @@ impl Simulator {
         let receiver = receiver(&sensor, &air, &options);
         let beam = BeamPattern::new(&sensor, receiver.sound_speed_m_s);
         let scatter_height_rad = beam.two_way_power_rad();
-        let expected = Arc::default();
-        RangerSetup { sensor, air, options, receiver, beam, scatter_height_rad, expected }
-            .simulator(scene)
+        let (bounded, expected) = Default::default();
+        let ranger = RangerSetup {
+            sensor,
+            air,
+            options,
+            receiver,
+            beam,
+            bounded,
+            scatter_height_rad,
+            expected,
+        };
+        Arc::new(ranger).simulator(scene)
     }
 
-    /// Returns the same ranger in another scene. Its receiver and its beam pattern, which take
-    /// longer to compute than a room's floor plan, are reused.
+    /// Returns the same ranger in another scene. Its receiver, its beam pattern and the pattern's
+    /// bounds, which take longer to compute than a room's floor plan, are shared.
     ///
     /// # Errors
     /// When the transducer would be in the floor or above the ceiling.
     pub fn in_scene(&self, scene: Arc<Scene>) -> Result<Self, ModelError> {
-        self.ranger.clone().simulator(scene)
+        Arc::clone(&self.ranger).simulator(scene)
     }
 
     /// Prepares for firing from `position` (world, metres). The costly part is done at the first
@@ -190,25 +193,25 @@ impl Simulator {
 
     /// Returns the effective receiver: the sensor's, with the options applied.
     #[must_use]
-    pub const fn receiver(&self) -> &Receiver {
+    pub fn receiver(&self) -> &Receiver {
         &self.ranger.receiver
     }
 
     /// Returns the beam pattern of the sensor in the air.
     #[must_use]
-    pub const fn beam(&self) -> &BeamPattern {
+    pub fn beam(&self) -> &BeamPattern {
         &self.ranger.beam
     }
 
     /// Returns the sensor whose readings are predicted.
     #[must_use]
-    pub const fn sensor(&self) -> &Sensor {
+    pub fn sensor(&self) -> &Sensor {
         &self.ranger.sensor
     }
 
     /// Returns the air of the scene.
     #[must_use]
-    pub const fn air(&self) -> &Air {
+    pub fn air(&self) -> &Air {
         &self.ranger.air
     }
 
@@ -217,7 +220,7 @@ impl Simulator {
     #[must_use]
     pub fn path_settings(&self) -> paths::PathSettings {
         let options = self.ranger.options.engine.paths().copied().unwrap_or_default();
-        let RangerSetup { sensor, air, receiver, scatter_height_rad, .. } = &self.ranger;
+        let RangerSetup { sensor, air, receiver, scatter_height_rad, .. } = &*self.ranger;
         path_settings(sensor, air, &options, receiver, *scatter_height_rad)
     }
 
@@ -226,7 +229,9 @@ impl Simulator {
     pub(super) fn stray_engine(&self, max_path_m: f64) -> Option<PathEngine> {
         self.ranger.options.engine.paths()?;
         let settings = paths::PathSettings { max_path_m, direct: true, ..self.path_settings() };
-        Some(self.ranger.path_engine(&self.scene, None, settings))
+        let RangerSetup { receiver, beam, .. } = &*self.ranger;
+        let engine = PathEngine::new(&self.scene, beam.clone(), None, settings);
+        Some(engine.through_nulls(receiver.needs_incidents()))
     }
 
     /// Returns the scene of the predictions.
@@ -242,13 +247,13 @@ impl Simulator {
     }
 
     pub(super) fn arrivals_between(&self, at: [DVec2; 2]) -> LazyArrivals<'_> {
-        let RangerSetup { receiver, expected, .. } = &self.ranger;
+        let RangerSetup { receiver, expected, .. } = &*self.ranger;
         LazyArrivals::new(self.engine.as_ref(), at, 2.0 * receiver.max_range_m, expected)
     }
 
     /// Returns the options of the model.
     #[must_use]
-    pub const fn options(&self) -> &Options {
+    pub fn options(&self) -> &Options {
         &self.ranger.options
     }
 }

@@ -60,7 +60,7 @@ impl CrosstalkPaths<'_> {
             let rises_rad = echo.rise_rad;
             let ends =
                 [self.engine.off_axis(out, rises_rad[0]), self.engine.off_axis(back, rises_rad[1])];
-            let [leaving, arriving] = ends.map(|angle| self.engine.beam.one_way(angle));
+            let [leaving, arriving] = ends.map(|angle| self.engine.pattern.beam.one_way(angle));
             let EchoPulse { length_m, phase_rad, gain } = self.found.pulse(index);
             let amplitude = gain * echo.amplitude * leaving * arriving;
             let bound = self.engine.upper_bound(echo.amplitude, amplitude, &ends);

@@ -1,15 +1,15 @@
 //! Exact engine: the echo paths of an observation point, weighted for an azimuth.
 
-use std::f64::consts::PI;
+use std::{f64::consts::PI, sync::Arc};
 
 use super::{
     direction_index::{DirectionEntry, DirectionIndex},
     floor::TracingPlan,
     found::{EchoPulse, FoundEchoes},
-    pattern::{PatternEnvelope, TwoWayBound},
+    pattern::{BoundedPattern, TwoWayBound},
     prepare::Paths,
     settings::PathSettings,
-    transducer::{DirectedPath, FaceEchoes, MULTIPLE_FLOOR_RATIO, MultipleEcho},
+    transducer::{DirectedPath, FaceEchoes, MultipleEcho},
 };
 use crate::{
     acoustics::{BeamPattern, Disc, Image, Incidence, Incident, PulseArrival},
@@ -26,12 +26,10 @@ use crate::{
 #[derive(Debug)]
 pub struct PathEngine {
     pub(super) paths: Paths,
-    pub(super) beam: BeamPattern,
+    pub(super) pattern: Arc<BoundedPattern>,
     pub(super) face: Option<Disc>,
-    envelope: PatternEnvelope,
-    /// Pattern bound for echoes by cylinders. `None` keeps all of them, as required for a tilted
-    /// axis, which may be nearer to a rising path than its azimuth is.
-    bound: Option<TwoWayBound>,
+    /// Lists only those echoes by cylinders that the pattern can leave detectable.
+    bounds_cylinders: bool,
     /// See [`Self::through_nulls`].
     through_nulls: bool,
 }
@@ -45,13 +43,26 @@ impl PathEngine {
         face: Option<Disc>,
         settings: PathSettings,
     ) -> Self {
-        let envelope = PatternEnvelope::new(&beam);
-        let needs_bound = !scene.cylinders.is_empty() && settings.tilt_rad == 0.0;
-        // Smallest loss of a path that the face reflects into another.
-        let reflected = face.map_or(0.0, |face| 2.0 * face.face.reflectance / MULTIPLE_FLOOR_RATIO);
-        let bound = needs_bound.then(|| TwoWayBound::new(&envelope, reflected));
+        let pattern = Arc::new(BoundedPattern::new(beam, face));
+        Self::with_pattern(scene, pattern, face, settings)
+    }
+
+    /// Prepares a scene for a ranger whose pattern is prepared already.
+    pub(crate) fn with_pattern(
+        scene: &Scene,
+        pattern: Arc<BoundedPattern>,
+        face: Option<Disc>,
+        settings: PathSettings,
+    ) -> Self {
+        // A tilted axis may be nearer to a rising path than its azimuth is.
+        let bounds_cylinders = !scene.cylinders.is_empty() && settings.tilt_rad == 0.0;
         let paths = Paths::new(scene, settings);
-        Self { paths, beam, face, envelope, bound, through_nulls: false }
+        Self { paths, pattern, face, bounds_cylinders, through_nulls: false }
+    }
+
+    /// Returns the pattern's bound for echoes by cylinders; `None` if all of them are listed.
+    fn cylinder_bound(&self) -> Option<&TwoWayBound> {
+        self.bounds_cylinders.then(|| self.pattern.two_way())
     }
 
     /// Also returns arrivals in a null of the beam pattern, where a steady tone is not detectable
@@ -85,7 +96,11 @@ impl PathEngine {
         amplitude: f64,
         ends_rad: &[f64; 2],
     ) -> f64 {
-        if self.through_nulls { path_amplitude * self.envelope.beyond(ends_rad) } else { amplitude }
+        if self.through_nulls {
+            path_amplitude * self.pattern.envelope.beyond(ends_rad)
+        } else {
+            amplitude
+        }
     }
 
     /// Angle, radians, between the transducer's axis and a direction at `azimuth_rad` from it in
@@ -140,12 +155,12 @@ impl<'a> PathArrivals<'a> {
         paths: Paths,
         [transmitter, receiver]: [DVec2; 2],
     ) -> Result<Self, TooCostly> {
-        let found = FoundEchoes::between(paths, [transmitter, receiver], engine.bound.as_ref())?;
+        let found = FoundEchoes::between(paths, [transmitter, receiver], engine.cylinder_bound())?;
         let (settings, echoes) = (&found.paths.plan.settings, &found.echoes);
         let mut entries: [Vec<DirectionEntry>; REACHES_DEG.len()] = Default::default();
         for (echo, index) in echoes.iter().zip(0..) {
             if let Some(mut entry) =
-                DirectionEntry::new(echo, index, &engine.envelope, settings.floor)
+                DirectionEntry::new(echo, index, &engine.pattern.envelope, settings.floor)
             {
                 if settings.tilt_rad != 0.0 {
                     // A tilted axis may be nearer to a rising path than its azimuth is.
@@ -163,13 +178,13 @@ impl<'a> PathArrivals<'a> {
         let face_echoes = engine
             .face
             .filter(|_| faces_level)
-            .map(|face| FaceEchoes::new(face, echoes, &engine.envelope, settings));
+            .map(|face| FaceEchoes::new(face, echoes, &engine.pattern.envelope, settings));
         Ok(Self { engine, found, indexes, face_echoes })
     }
 
     /// Multiple echoes by way of the face up to a length, metres, in a direction in (-pi, pi].
     fn multiple_echoes(&self, direction_rad: f64, length_m: f64) -> Vec<MultipleEcho> {
-        let (beam, settings) = (&self.engine.beam, &self.found.paths.plan.settings);
+        let (beam, settings) = (&self.engine.pattern.beam, &self.found.paths.plan.settings);
         let max_m = length_m.min(settings.max_path_m);
         let found = |echoes: &FaceEchoes| {
             echoes.multiple_echoes(direction_rad, beam, settings.floor, max_m)
@@ -229,7 +244,7 @@ impl<'a> PathArrivals<'a> {
             [&multiple.paths[0], &multiple.paths[multiple.paths.len() - 1]].map(ends_rad);
         let ends_rad = [first[0], last[1]];
         let [leaving, arriving] =
-            ends_rad.map(|end| self.engine.beam.one_way(wrap_pi(end - direction_rad)));
+            ends_rad.map(|end| self.engine.pattern.beam.one_way(wrap_pi(end - direction_rad)));
         (amplitude / (leaving * arriving), ends_rad)
     }
 
@@ -263,7 +278,7 @@ impl Arrivals for PathArrivals<'_> {
         let direction_rad = wrap_pi(direction_rad);
         let FoundEchoes { paths, echoes, .. } = &self.found;
         let within = self.found.count_within(length_m) as u32;
-        let (beam, floor) = (&self.engine.beam, paths.plan.settings.floor);
+        let (beam, floor) = (&self.engine.pattern.beam, paths.plan.settings.floor);
         let is_flat = self.engine.is_flat();
         for directions in &self.indexes {
             directions.near(direction_rad, within, |entry, off_rad| {

@@ -1,11 +1,44 @@
 //! Bounds by the beam pattern: maximum amplitude of an echo, by angle.
 
-use std::f64::consts::PI;
+use std::{f64::consts::PI, sync::OnceLock};
 
-use crate::{acoustics::BeamPattern, geometry::wrap_pi};
+use crate::{
+    acoustics::{BeamPattern, Disc},
+    geometry::wrap_pi,
+};
 
 /// Number of steps of the envelope, of half a degree.
 const ENVELOPE_STEPS: usize = 360;
+
+/// Ratio of the weakest multiple echo by the transducer's face to the weakest echo of the search,
+/// which is 20 dB below the threshold: only multiple echoes that can be detected are listed. There
+/// are a great many weaker ones.
+pub(crate) const MULTIPLE_FLOOR_RATIO: f64 = 10.0;
+
+/// Beam pattern of a ranger with its bounds, which are the same in every scene.
+#[derive(Debug)]
+pub(crate) struct BoundedPattern {
+    pub(crate) beam: BeamPattern,
+    pub(crate) envelope: PatternEnvelope,
+    /// Smallest loss of a path that the face reflects into another.
+    reflected: f64,
+    /// Computed for the first scene with cylinders.
+    two_way: OnceLock<TwoWayBound>,
+}
+
+impl BoundedPattern {
+    /// Computes the bounds of a pattern for a transducer with a reflecting face, or none.
+    pub(crate) fn new(beam: BeamPattern, face: Option<Disc>) -> Self {
+        let reflected = face.map_or(0.0, |face| 2.0 * face.face.reflectance / MULTIPLE_FLOOR_RATIO);
+        let envelope = PatternEnvelope::new(&beam);
+        Self { beam, envelope, reflected, two_way: OnceLock::new() }
+    }
+
+    /// Returns the bound over all azimuths.
+    pub(crate) fn two_way(&self) -> &TwoWayBound {
+        self.two_way.get_or_init(|| TwoWayBound::new(&self.envelope, self.reflected))
+    }
+}
 
 /// Upper envelope of a beam pattern: for each angle from the axis the maximum of the pattern there
 /// or farther out. Decreases monotonically despite side lobes.

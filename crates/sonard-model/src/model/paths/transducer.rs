@@ -25,5 +25,5 @@ mod search;
 #[cfg(test)]
 mod tests;
 
-pub(super) use face_echoes::{FaceEchoes, MULTIPLE_FLOOR_RATIO};
+pub(super) use face_echoes::FaceEchoes;
 pub(super) use face_path::{DirectedPath, MultipleEcho};

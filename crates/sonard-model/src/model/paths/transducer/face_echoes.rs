@@ -15,16 +15,11 @@ use crate::{
     model::paths::{
         direction_index::{DirectionEntry, DirectionIndex, wrap_once},
         echo::PathEcho,
-        pattern::PatternEnvelope,
+        pattern::{MULTIPLE_FLOOR_RATIO, PatternEnvelope},
         settings::PathSettings,
         tolerance::SAME_RAD,
     },
 };
-
-/// Ratio of the weakest multiple echo to the weakest echo of the search, which is 20 dB below the
-/// threshold: only multiple echoes that can be detected are listed. There are a great many weaker
-/// ones.
-pub(crate) const MULTIPLE_FLOOR_RATIO: f64 = 10.0;
 
 /// Echo paths from the face to the face.
 pub(crate) struct FaceEchoes {
