@@ -34,6 +34,10 @@ pub struct EchoShape {
 /// Sample spacing, microseconds: 1/45 of a 7 kHz filter's standard deviation.
 const STEP_US: f64 = 0.5;
 
+/// Number whose neighbours differ by 1, so that a number of smaller magnitude added to it is
+/// rounded to an integer, in its last bits: 1.5 times 2 to the power of 52.
+const INTEGER_BITS: f64 = 6_755_399_441_055_744.0;
+
 /// Number of tabulated levels of the rise.
 const RISE_LEVELS: usize = 64;
 
@@ -146,10 +150,12 @@ impl EchoShape {
     #[inline]
     pub(super) fn real_at(&self, t_us: f64) -> f64 {
         let place = (t_us - self.first_us) * self.steps_per_us;
-        // Conversion to `u32` takes fewer instructions than to `usize`.
-        let below = place as u32;
+        // The last bits of `shifted` are the integer below `place`: a conversion takes more
+        // instructions than all other arithmetic here.
+        let shifted = place - 0.5 + INTEGER_BITS;
+        let below = shifted.to_bits().wrapping_sub(INTEGER_BITS.to_bits());
         match self.real.get(below as usize) {
-            Some([low, step]) if place >= 0.0 => low + (place - f64::from(below)) * step,
+            Some([low, step]) if place >= 0.0 => low + (place - (shifted - INTEGER_BITS)) * step,
             _ => 0.0,
         }
     }

@@ -29,6 +29,8 @@ pub(super) struct PulseTrack<'a> {
     next_us: f64,
     /// Nominal time of flight of the next arrival.
     next_tof_us: f64,
+    /// Time before which no pulse begins and none of those in progress ends.
+    unchanged_until_us: f64,
     /// Upper bounds for the active pulses.
     bounds: ActiveBounds,
     /// Exponent of the gain's rise with time.
@@ -70,6 +72,7 @@ impl<'a> PulseTrack<'a> {
             summed: 0,
             next_us: f64::INFINITY,
             next_tof_us: f64::INFINITY,
+            unchanged_until_us: f64::NEG_INFINITY,
             bounds: ActiveBounds::default(),
             exponent,
             span_us,
@@ -112,6 +115,7 @@ impl<'a> PulseTrack<'a> {
         self.pulses.truncate(self.over + known);
         self.begun = self.pulses.partition_point(|pulse| pulse.lasts_us[0] <= t_us).max(self.over);
         (self.summed, self.bounds) = (0, ActiveBounds::default());
+        self.unchanged_until_us = f64::NEG_INFINITY;
         self.peek_next();
     }
 
@@ -167,10 +171,21 @@ impl<'a> PulseTrack<'a> {
     /// Admits and drops arrivals up to a time.
     #[inline]
     pub(super) fn advance(&mut self, t_us: f64) {
+        if t_us < self.unchanged_until_us {
+            self.examine(t_us);
+        } else {
+            self.change_active(t_us);
+        }
+    }
+
+    /// Admits and drops arrivals up to a time at which some may begin or end.
+    fn change_active(&mut self, t_us: f64) {
         self.admit(t_us, t_us);
         while self.over < self.begun && self.pulses[self.over].lasts_us[1] < t_us {
             self.over += 1;
         }
+        let first_end_us = self.active().first().map_or(f64::INFINITY, |pulse| pulse.lasts_us[1]);
+        self.unchanged_until_us = self.next_us.min(first_end_us);
     }
 
     /// Admits the arrivals that begin up to a time; those that end before `now_us` become
