@@ -61,6 +61,8 @@ pub(crate) struct ThresholdScan {
     receiver: Receiver,
     /// Minimum margin of an isolated echo for detection, decibels.
     min_margin_db: f64,
+    /// Maximum time walk between two thresholds of an isolated echo, metres.
+    max_walk_m: f64,
     /// Range of thresholds scanned, decibels on either side of the nominal one.
     span_db: f64,
     /// Amplitude factors of the lowest and the highest threshold.
@@ -99,7 +101,10 @@ impl ThresholdScan {
             receiver.combining = Combining::Incoherent;
         }
         let min_margin_db = receiver.min_margin_db();
-        Self { receiver, min_margin_db, span_db, ends: [-span_db, span_db].map(factor) }
+        let [latest_m, earliest_m] =
+            [MIN_MARGIN_DB, f64::INFINITY].map(|db| receiver.time_walk_m(db));
+        let (max_walk_m, ends) = (latest_m - earliest_m, [-span_db, span_db].map(factor));
+        Self { receiver, min_margin_db, max_walk_m, span_db, ends }
     }
 
     /// Collects all candidates of a firing into `found`.
@@ -156,8 +161,7 @@ impl ThresholdScan {
         if first.by_db >= at_db {
             return (first, until_db);
         }
-        let rise = bank.first_rise(self.factor(at_db), ready_us);
-        let Some(rise) = rise.filter(|rise| self.is_same(&first, rise, at_db)) else {
+        let Some(rise) = self.same_at(bank, &first, at_db, ready_us) else {
             return (first, until_db);
         };
         let evaluated = match self.needs_peak(until_db) {
@@ -228,14 +232,27 @@ impl ThresholdScan {
         if beyond_db <= from_db {
             return reaches_db.min(span_db.max(from_db));
         }
-        let mut is_reported = |by_db: f64| {
-            let rise = bank.first_rise(self.factor(by_db), ready_us);
-            rise.is_some_and(|rise| self.is_same(reported, &rise, by_db))
-        };
+        let mut is_reported = |by_db: f64| self.same_at(bank, reported, by_db, ready_us).is_some();
         match is_reported(beyond_db) {
             true => reaches_db,
             false => last_of(from_db, beyond_db, is_reported),
         }
+    }
+
+    /// Returns the first rise at a higher threshold if it is the same as a reported one.
+    fn same_at(
+        &self,
+        bank: &mut DetectorBank,
+        reported: &ReportedRise,
+        by_db: f64,
+        ready_us: f64,
+    ) -> Option<EchoRise> {
+        /// Margin beyond which a rise is certainly another one, microseconds.
+        const SLACK_US: f64 = 1.0;
+        let us_per_m = 2e6 / self.receiver.sound_speed_m_s;
+        let until_us = reported.rise.passed_us + us_per_m * (JUMP_M + self.max_walk_m) + SLACK_US;
+        let rise = bank.first_rise_within(self.factor(by_db), ready_us, until_us)?;
+        self.is_same(reported, &rise, by_db).then_some(rise)
     }
 
     /// Returns `true` if two rises, the second at a higher threshold, are the same rise of the

@@ -136,7 +136,7 @@ impl Receiver {
         ready_us: f64,
     ) -> (Detection, Option<f64>) {
         let mut detector = start_detector(firing);
-        let detection = match detector.next_rise(self.scan_start_us(ready_us)) {
+        let detection = match detector.next_rise(self.scan_start_us(ready_us), f64::INFINITY) {
             Some(first_us) => self.echoes(detector.as_mut(), first_us, latch),
             None => self.no_echo(detector.as_mut(), firing.arrivals),
         };
@@ -155,14 +155,14 @@ impl Receiver {
         echoes_us.push(reported_us);
         while latch == Latch::Rearmed
             && echoes_us.len() < MAX_ECHOES
-            && let Some(next_us) = detector.next_rise(last_us + self.rearm_us)
+            && let Some(next_us) = detector.next_rise(last_us + self.rearm_us, f64::INFINITY)
         {
             echoes_us.push(next_us + detector.delay_us(next_us));
             last_us = next_us;
         }
         let has_more_echoes = latch == Latch::Rearmed
             && echoes_us.len() == MAX_ECHOES
-            && detector.next_rise(last_us + self.rearm_us).is_some();
+            && detector.next_rise(last_us + self.rearm_us, f64::INFINITY).is_some();
         Detection {
             status,
             range_m: Some(self.range_m(reported_us)),

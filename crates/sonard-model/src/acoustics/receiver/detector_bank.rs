@@ -50,6 +50,18 @@ impl DetectorBank<'_> {
     /// `ready_us`, microseconds; `None` without an echo.
     #[must_use]
     pub fn first_rise(&mut self, factor: f64, ready_us: f64) -> Option<EchoRise> {
+        self.first_rise_within(factor, ready_us, f64::INFINITY)
+    }
+
+    /// First rise as from [`first_rise`](Self::first_rise); `None` also for one after `until_us`,
+    /// microseconds, as far as it has not been found by then.
+    #[must_use]
+    pub fn first_rise_within(
+        &mut self,
+        factor: f64,
+        ready_us: f64,
+        until_us: f64,
+    ) -> Option<EchoRise> {
         let receiver = self.receiver;
         let from_us = receiver.scan_start_us(ready_us);
         self.detector.set_threshold_factor(factor);
@@ -63,7 +75,7 @@ impl DetectorBank<'_> {
             });
         }
         self.detector.rewind_to(from_us);
-        let at_us = self.detector.next_rise(from_us)?;
+        let at_us = self.detector.next_rise(from_us, until_us)?;
         let status = receiver.status_at(at_us);
         // As in a detection: a carrier comparator rises at the following crest.
         let later_us = match status {

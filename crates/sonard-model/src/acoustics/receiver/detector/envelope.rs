@@ -103,9 +103,9 @@ impl<'a, S: Summation> EnvelopeDetector<'a, S> {
 
 impl<S: Summation> EchoDetector for EnvelopeDetector<'_, S> {
     /// The envelope exceeds the threshold for the integration time.
-    fn next_rise(&mut self, ready_us: f64) -> Option<f64> {
+    fn next_rise(&mut self, ready_us: f64, until_us: f64) -> Option<f64> {
         self.isolated = None;
-        self.search_rise(ready_us)
+        self.search_rise(ready_us, until_us)
     }
 
     fn delay_us(&mut self, rise_us: f64) -> f64 {

@@ -27,8 +27,9 @@ pub(in super::super) struct Firing<'a> {
 /// calls, except by [`rewind_to`](Self::rewind_to).
 pub(in super::super) trait EchoDetector {
     /// Returns the next rise of ECHO for a detector that is ready from `ready_us` on, before the
-    /// delay of its timing. The rise is immediate if a signal is present at that time.
-    fn next_rise(&mut self, ready_us: f64) -> Option<f64>;
+    /// delay of its timing. The rise is immediate if a signal is present at that time. A rise after
+    /// `until_us` may be left out.
+    fn next_rise(&mut self, ready_us: f64, until_us: f64) -> Option<f64>;
 
     /// Delay of ECHO after a rise by the detector's timing, relative to that of the reference
     /// echo, microseconds.

@@ -34,7 +34,7 @@ impl<'a> IdealDetector<'a> {
 }
 
 impl EchoDetector for IdealDetector<'_> {
-    fn next_rise(&mut self, ready_us: f64) -> Option<f64> {
+    fn next_rise(&mut self, ready_us: f64, _until_us: f64) -> Option<f64> {
         let receiver = self.track.firing.receiver;
         let lasts_until_us = |arrival: &PulseArrival| receiver.tof_us(arrival) + receiver.pulse_us;
         let found = self.detectable().find(|arrival| lasts_until_us(arrival) >= ready_us);

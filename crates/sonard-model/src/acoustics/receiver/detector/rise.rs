@@ -20,21 +20,25 @@ const LONG_STEP_US: f64 = 30.0;
 const LONG_QUIET_US: f64 = 200.0;
 
 impl<S: Summation> EnvelopeDetector<'_, S> {
-    /// Searches the next rise for a detector that is ready from `ready_us` on.
-    pub(super) fn search_rise(&mut self, ready_us: f64) -> Option<f64> {
+    /// Searches the next rise for a detector that is ready from `ready_us` on, at least up to
+    /// `until_us`.
+    pub(super) fn search_rise(&mut self, ready_us: f64, until_us: f64) -> Option<f64> {
         let receiver = self.track.firing.receiver;
         let integration_us = receiver.integration_us;
         let window_us = receiver.window_us() + WINDOW_SLACK_US;
         let in_window = |rise_us: f64| Some(rise_us.max(ready_us)).filter(|us| *us <= window_us);
         let (mut t_us, mut here) = (ready_us, self.relative_level(ready_us));
+        // A rise is found at the first sample after the integration time.
+        let deadline_us = until_us + integration_us + STEP_US;
+        let last_us = (window_us + 2.0 * integration_us).min(deadline_us);
         // Time above the threshold minus time below it since then.
         let mut charge_us = 0.0_f64;
-        while t_us <= window_us + 2.0 * integration_us && !self.track.exceeds_horizon() {
+        while t_us <= last_us && !self.track.exceeds_horizon() {
             if !here.is_above()
                 && charge_us == 0.0
                 && self.watched != Some(self.track.active_range())
             {
-                match self.skip(t_us) {
+                match self.skip(t_us, deadline_us) {
                     Skip::Exhausted => return None,
                     Skip::Isolated { rise_us } => {
                         let is_isolated = self.has_tabulated_rises() && self.is_isolated_now();
@@ -79,12 +83,13 @@ impl<S: Summation> EnvelopeDetector<'_, S> {
         None
     }
 
-    /// Next time at which the envelope may cross the threshold, from a time at which it is below.
-    fn skip(&mut self, mut t_us: f64) -> Skip {
+    /// Next time at which the envelope may cross the threshold, from a time at which it is below; as
+    /// far as it is before `deadline_us`.
+    fn skip(&mut self, mut t_us: f64, deadline_us: f64) -> Skip {
         if self.track.firing.noise.is_some() {
             return Skip::To(t_us);
         }
-        loop {
+        while t_us <= deadline_us {
             self.track.advance(t_us);
             if self.track.exceeds_horizon() {
                 return Skip::Exhausted;
@@ -124,6 +129,8 @@ impl<S: Summation> EnvelopeDetector<'_, S> {
                 None => return self.exhausted(),
             }
         }
+        self.track.examine(deadline_us);
+        Skip::Exhausted
     }
 
     /// Returns `true` if the active pulses, added in phase, could exceed the minimum threshold.
@@ -255,7 +262,7 @@ impl RelativeLevel {
 
 /// Continuation of the scan from a time below the threshold.
 enum Skip {
-    /// No further arrival can be detected.
+    /// No further arrival can be detected in time.
     Exhausted,
     /// An isolated arrival crosses the threshold.
     Isolated { rise_us: f64 },
