@@ -1,8 +1,9 @@
 //! Echo detectors: each scans the arrivals of one firing for the times at which ECHO rises.
 //!
-//! A further kind of detector is an implementation of [`EchoDetector`](firing::EchoDetector) in a file of its own, or of
-//! [`Summation`](sum::Summation) if it compares an envelope with the threshold, and an arm of
-//! [`start_detector`].
+//! A further detector is a variant of [`Detector`], a file with its
+//! [`EchoDetector`](firing::EchoDetector) (or its [`EchoTiming`](timing::EchoTiming), if it only
+//! delays what the envelope raises), and its arm in [`start_detector`], the one place that
+//! distinguishes detectors.
 
 mod coherent;
 mod envelope;
@@ -22,14 +23,24 @@ use self::{
     firing::{EchoDetector, Firing},
     ideal::IdealDetector,
     power::PowerSum,
+    timing::{CarrierTiming, EnvelopeTiming},
 };
 use super::characteristics::Combining;
+use crate::acoustics::Detector;
 
 /// Starts the detector of a firing's receiver.
 pub(super) fn start_detector(firing: Firing<'_>) -> Box<dyn EchoDetector + '_> {
-    match firing.receiver.combining {
-        Combining::Coherent => Box::new(EnvelopeDetector::<CoherentSum>::new(firing)),
-        Combining::Incoherent => Box::new(EnvelopeDetector::<PowerSum>::new(firing)),
-        Combining::Ideal => Box::new(IdealDetector::new(firing)),
+    match (firing.receiver.combining, firing.receiver.detector) {
+        (Combining::Ideal, _) => Box::new(IdealDetector::new(firing)),
+        (Combining::Coherent, Detector::Envelope) => {
+            Box::new(EnvelopeDetector::<CoherentSum>::new(firing, &EnvelopeTiming))
+        }
+        (Combining::Coherent, Detector::Carrier) => {
+            Box::new(EnvelopeDetector::<CoherentSum>::new(firing, &CarrierTiming))
+        }
+        // A sum of powers has no carrier phase.
+        (Combining::Incoherent, Detector::Envelope | Detector::Carrier) => {
+            Box::new(EnvelopeDetector::<PowerSum>::new(firing, &EnvelopeTiming))
+        }
     }
 }

@@ -8,8 +8,6 @@ use super::sum::{Summation, modulus};
 pub(super) struct CoherentSum;
 
 impl Summation for CoherentSum {
-    const HAS_PHASE: bool = true;
-
     #[inline]
     fn level(fields: impl Iterator<Item = Complex64>, gain: f64, noise: Complex64) -> f64 {
         modulus(fields.fold(Complex64::ZERO, |sum, field| sum + field) * gain + noise)

@@ -13,7 +13,7 @@ use super::{
     pulse_track::PulseTrack,
     sum::Summation,
     threshold::EffectiveThreshold,
-    timing::{EchoTiming, timing_for},
+    timing::EchoTiming,
 };
 use crate::{acoustics::receiver::characteristics::PulseArrival, reading::PingStatus};
 
@@ -48,13 +48,13 @@ pub(super) struct IsolatedPulse {
 }
 
 impl<'a, S: Summation> EnvelopeDetector<'a, S> {
-    pub(super) fn new(firing: Firing<'a>) -> Self {
+    pub(super) fn new(firing: Firing<'a>, timing: &'static dyn EchoTiming) -> Self {
         let track = PulseTrack::new(firing);
         Self {
             is_plain: track.is_uniform() && firing.noise.is_none(),
             track,
             threshold: EffectiveThreshold::new(firing.receiver),
-            timing: timing_for(firing.receiver.detector, S::HAS_PHASE),
+            timing,
             watched: None,
             isolated: None,
             summation: PhantomData,

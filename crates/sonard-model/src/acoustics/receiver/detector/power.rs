@@ -8,8 +8,6 @@ use super::sum::{Summation, modulus};
 pub(super) struct PowerSum;
 
 impl Summation for PowerSum {
-    const HAS_PHASE: bool = false;
-
     #[inline]
     fn level(fields: impl Iterator<Item = Complex64>, gain: f64, noise: Complex64) -> f64 {
         let level = fields.map(|field| field.norm_sqr()).sum::<f64>().sqrt() * gain;

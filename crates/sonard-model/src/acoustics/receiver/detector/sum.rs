@@ -4,9 +4,6 @@ use num_complex::Complex64;
 
 /// Rule by which overlapping pulses add up to an envelope.
 pub(super) trait Summation {
-    /// The sum has a carrier phase.
-    const HAS_PHASE: bool;
-
     /// Envelope of the sum of complex amplitudes, which is amplified by `gain`, and noise.
     fn level(fields: impl Iterator<Item = Complex64>, gain: f64, noise: Complex64) -> f64;
 }

@@ -1,6 +1,6 @@
 //! Timing policies: the instant at which ECHO rises after the envelope has crossed the threshold.
 
-use crate::acoustics::{Detector, receiver::characteristics::Receiver};
+use crate::acoustics::receiver::characteristics::Receiver;
 
 /// Timing policy of an envelope detector.
 pub(super) trait EchoTiming {
@@ -21,7 +21,7 @@ pub(super) trait EchoTiming {
 }
 
 /// ECHO rises with the envelope.
-struct EnvelopeTiming;
+pub(super) struct EnvelopeTiming;
 
 impl EchoTiming for EnvelopeTiming {
     fn delay_us(&self, _: &Receiver, _: f64, _: &mut dyn FnMut() -> f64) -> f64 {
@@ -34,7 +34,7 @@ impl EchoTiming for EnvelopeTiming {
 }
 
 /// ECHO rises at the next crest of the carrier.
-struct CarrierTiming;
+pub(super) struct CarrierTiming;
 
 impl EchoTiming for CarrierTiming {
     fn delay_us(
@@ -44,14 +44,5 @@ impl EchoTiming for CarrierTiming {
         phase_rad: &mut dyn FnMut() -> f64,
     ) -> f64 {
         receiver.until_crest_us(phase_rad(), crossing_us) - receiver.crest_us
-    }
-}
-
-/// Returns the policy of a detector for a sum with or without a carrier phase: without one, a
-/// carrier comparator acts as an envelope detector.
-pub(super) fn timing_for(detector: Detector, has_phase: bool) -> &'static dyn EchoTiming {
-    match detector {
-        Detector::Carrier if has_phase => &CarrierTiming,
-        Detector::Envelope | Detector::Carrier => &EnvelopeTiming,
     }
 }
