@@ -39,14 +39,21 @@ pub(super) struct Args {
     /// Output folder; scene, poses, walls with their status, report, picture
     #[arg(long, value_name = "DIR")]
     out: OutPath,
-    /// Standard deviations of the poses in the log as odometry: of the position per metre driven,
-    /// and of the heading, degrees per metre driven
-    #[arg(long, value_name = "M,DEG", default_value = "0.05,5", value_parser = parse_odometry)]
+    /// Standard deviations of the poses in the log as odometry: of the position and of the heading,
+    /// metres and degrees per metre driven; then, if given, both at each stop besides (5 mm and 0.5
+    /// degrees)
+    #[arg(long, value_name = "M,DEG[,M,DEG]", default_value = "0.05,5", value_parser = parse_odometry)]
     odometry: OdometrySigma,
+    /// Positions in the log are waypoints in one frame, however wrong the headings are
+    #[arg(long, conflicts_with = "no_odometry")]
+    waypoints: bool,
     /// Ignore the poses in the log
     #[arg(long, conflicts_with = "odometry")]
     no_odometry: bool,
-    /// Most walls are square to each other
+    /// Standard deviation of ranges, metres, instead of 4 mm and the step of the ranger
+    #[arg(long, value_name = "M", value_parser = within(0.001..=0.1))]
+    range_sigma: Option<f64>,
+    /// Most walls are square to each other: a line off the common axis costs up to 6 nats
     #[arg(long)]
     square: bool,
     /// Keep conjectured stretches of walls in scene.json
@@ -138,29 +145,36 @@ impl Args {
         /// Standard deviation of the directions of walls in a room that is mostly square.
         const SQUARE_DEG: f64 = 1.0;
         SurveyOptions {
-            odometry: (!self.no_odometry).then_some(self.odometry),
+            odometry: (!self.no_odometry)
+                .then_some(OdometrySigma { are_waypoints: self.waypoints, ..self.odometry }),
+            range_sigma_m: self.range_sigma,
             square_deg: self.square.then_some(SQUARE_DEG),
             reflectance: self.reflectance,
             max_scenes: self.max_scenes,
+            ..SurveyOptions::default()
         }
     }
 }
 
 fn parse_odometry(text: &str) -> Result<OdometrySigma, String> {
-    let parts = text.split_once(',').and_then(|(m, deg)| {
-        Some([m.trim().parse::<f64>().ok()?, deg.trim().parse::<f64>().ok()?])
-    });
-    match parts {
-        Some([m_per_m, deg_per_m])
-            if (1e-4..=1.0).contains(&m_per_m) && (0.01..=180.0).contains(&deg_per_m) =>
-        {
-            Ok(OdometrySigma { m_per_m, deg_per_m })
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    let standard = OdometrySigma::default();
+    let sigma = match numbers.as_deref() {
+        Ok(&[m_per_m, deg_per_m]) => Some(OdometrySigma { m_per_m, deg_per_m, ..standard }),
+        Ok(&[m_per_m, deg_per_m, m_per_stop, deg_per_stop]) => {
+            Some(OdometrySigma { m_per_m, deg_per_m, m_per_stop, deg_per_stop, ..standard })
         }
-        _ => Err(
-            "give metres per metre (0.0001 to 1) and degrees per metre (0.01 to 180), such as 0.05,5"
-                .to_owned(),
-        ),
-    }
+        _ => None,
+    };
+    let is_valid = |sigma: &OdometrySigma| {
+        [sigma.m_per_m, sigma.m_per_stop].iter().all(|m| (1e-4..=1.0).contains(m))
+            && [sigma.deg_per_m, sigma.deg_per_stop].iter().all(|deg| (0.01..=180.0).contains(deg))
+    };
+    sigma.filter(is_valid).ok_or_else(|| {
+        "give metres (0.0001 to 1) and degrees (0.01 to 180) per metre, such as 0.05,5, and, if you \
+         like, both per stop, such as 0.05,5,0.01,2"
+            .to_owned()
+    })
 }
 
 fn parse_count(text: &str) -> Result<usize, String> {

@@ -2,7 +2,10 @@
 
 use sonard_model::geometry::{wrap_180, wrap_360};
 
-use crate::readings::{Outcome, Readings};
+use crate::{
+    range_errors::RangeErrors,
+    readings::{Outcome, Readings},
+};
 
 /// Maximum difference of neighbouring ranges within an arc, metres.
 const SAME_M: f64 = 0.008;
@@ -26,12 +29,14 @@ pub(crate) struct Arc {
     pub(crate) is_cut: bool,
     /// Indices of the beams in the sweep.
     pub(crate) beams: Vec<usize>,
+    /// Errors of the ranger.
+    pub(crate) errors: RangeErrors,
 }
 
 impl Arc {
     /// Standard deviation of the azimuth, degrees.
-    pub(crate) const fn sigma_deg(&self) -> f64 {
-        if self.is_cut { 4.0 } else { 0.8 }
+    pub(crate) fn sigma_deg(&self) -> f64 {
+        self.errors.bearing_factor() * if self.is_cut { 4.0 } else { 0.8 }
     }
 }
 
@@ -49,10 +54,11 @@ struct Run {
 ///
 /// A run of echoes whose neighbours differ by at most 8 mm is an arc; runs of equal range that a
 /// null of the beam pattern separates are one.
-pub(crate) fn find_arcs(sweep: usize, readings: &Readings) -> Vec<Arc> {
-    let mut runs = runs(readings);
+pub(crate) fn find_arcs(sweep: usize, readings: &Readings, errors: RangeErrors) -> Vec<Arc> {
+    let same_m = errors.same_m(SAME_M);
+    let mut runs = runs(readings, same_m);
     runs.sort_by(|a, b| a.first_deg.total_cmp(&b.first_deg));
-    while let Some((at, other)) = lobes(&runs) {
+    while let Some((at, other)) = lobes(&runs, same_m) {
         let second = runs[other].clone();
         let first = &mut runs[at];
         let counts = [first.beams.len() as f64, second.beams.len() as f64];
@@ -69,21 +75,17 @@ pub(crate) fn find_arcs(sweep: usize, readings: &Readings) -> Vec<Arc> {
         range_m: run.range_m,
         is_cut: run.is_cut.contains(&true),
         beams: run.beams,
+        errors,
     };
     runs.into_iter().map(arc).collect()
 }
 
-/// Minimum number of beams of an arc: three of a fine sweep, one of a coarse one.
-fn min_beams(readings: &Readings) -> usize {
-    (5.4 / readings.step_deg).ceil().clamp(1.0, 3.0) as usize
-}
-
-fn runs(readings: &Readings) -> Vec<Run> {
+fn runs(readings: &Readings, same_m: f64) -> Vec<Run> {
     let count = readings.beams.len();
     let outcome = |at: usize| readings.beams[at % count].outcome;
     let is_joined = |at: usize| match (outcome(at), outcome(at + 1)) {
         (Outcome::Echo(a), Outcome::Echo(b)) => {
-            (a - b).abs() < SAME_M && readings.gap_after_deg(at % count) < 2.0 * readings.step_deg
+            (a - b).abs() < same_m && readings.gap_after_deg(at % count) < 2.0 * readings.step_deg
         }
         _ => false,
     };
@@ -99,7 +101,8 @@ fn runs(readings: &Readings) -> Vec<Run> {
             last += 1;
         }
         done += last - first + 1;
-        if last - first + 1 >= min_beams(readings) && matches!(outcome(first), Outcome::Echo(_)) {
+        if last - first + 1 >= readings.min_arc_beams && matches!(outcome(first), Outcome::Echo(_))
+        {
             found.push(run(readings, first, last));
         }
     }
@@ -139,13 +142,13 @@ pub(crate) fn quantile(sorted: &[f64], share: f64) -> f64 {
 }
 
 /// Two runs that are lobes of one echo.
-fn lobes(runs: &[Run]) -> Option<(usize, usize)> {
+fn lobes(runs: &[Run], same_m: f64) -> Option<(usize, usize)> {
     let pairs = (0..runs.len()).flat_map(|a| (0..runs.len()).map(move |b| (a, b)));
     pairs.filter(|(a, b)| a != b).find(|&(a, b)| {
         let (first, second) = (&runs[a], &runs[b]);
         let gap_deg = wrap_360(second.first_deg - first.first_deg - first.extent_deg);
         gap_deg < MAX_NULL_DEG
-            && (first.range_m - second.range_m).abs() < SAME_M
+            && (first.range_m - second.range_m).abs() < same_m
             && first.extent_deg + gap_deg + second.extent_deg < MAX_EXTENT_DEG
     })
 }

@@ -1,6 +1,6 @@
 //! Arrangement of lines: each is cut into pieces, and a plan is the set of pieces that are walls.
 
-use sonard_model::geometry::{DVec2, Pose};
+use sonard_model::geometry::{DVec2, Pose, distance_to_segment};
 
 use crate::line::Line;
 
@@ -100,6 +100,31 @@ impl LineArrangement {
             })
             .collect();
         Self::with_free_cuts(bare.lines, poses, reach_m, &free)
+    }
+
+    /// Arrangement of the lines of walls with those walls.
+    pub(crate) fn of_walls(walls: &[[DVec2; 2]], poses: &[Pose], reach_m: f64) -> (Self, PieceSet) {
+        const ON_M: f64 = 1e-3;
+        let mut lines: Vec<Line> = Vec::new();
+        for [a, b] in walls {
+            let line = Line::through((*b - *a).perp().to_angle(), *a);
+            if !lines.iter().any(|known| known.is_same(&line, *a, ON_M)) {
+                lines.push(line);
+            }
+        }
+        let ends: Vec<(DVec2, usize)> = walls.iter().flatten().map(|end| (*end, 1)).collect();
+        lines.iter_mut().for_each(|line| line.attach_points(&ends));
+        let plan = Self::new(lines, poses, reach_m);
+        let mut set = PieceSet::new(plan.pieces());
+        for line in 0..plan.lines.len() {
+            for at in 0..plan.pieces_of(line) {
+                let [from, to] = [at, at + 1].map(|cut| plan.cuts[line][cut].along_m);
+                let middle = plan.lines[line].at(0.5 * (from + to));
+                let is_on = |[a, b]: &[DVec2; 2]| distance_to_segment(middle, *a, *b) < ON_M;
+                set.set(plan.piece(line, at), walls.iter().any(is_on));
+            }
+        }
+        (plan, set)
     }
 
     /// Cuts lines at each other and at given positions of each.

@@ -90,7 +90,8 @@ fn faces(posed: &PosedPlan, walls: &[Segment], left: &[&Arc]) -> Vec<BoxShape> {
 
 /// Likeliest box behind a face, on either side of it.
 fn grown(face: &BoxShape, walls: &[Segment], judge: &Judge) -> Option<(f64, BoxShape)> {
-    let rough = Judge::new(judge.workspace, &judge.poses, ROUGH_SIGMA_M);
+    let rough =
+        Judge::new(judge.workspace, &judge.poses, judge.workspace.errors.sigma_m(ROUGH_SIGMA_M));
     let count = ((SIDE_M[1] - SIDE_M[0]) / STEP_M) as i32;
     let depth = |at: i32| {
         let depth_m = SIDE_M[0] + STEP_M * f64::from(at.abs() - 1);

@@ -108,7 +108,7 @@ fn add_arc(
         row
     };
     let range = row(rates.range_by_feature, rates.range_by_place, 0.0);
-    normal.add(&range, arc.range_m - range_m, SIGMA_M, ROBUST);
+    normal.add(&range, arc.range_m - range_m, arc.errors.sigma_m(SIGMA_M), ROBUST);
     // The arc is at its azimuth from the heading: a turn of the pose reduces the predicted azimuth.
     let bearing = row(rates.bearing_by_feature, rates.bearing_by_place, -1.0);
     let off_rad = wrap_pi(pose.direction_rad(arc.azimuth_deg) - bearing_rad);

@@ -17,6 +17,7 @@ use sonard_model::{
 use crate::{
     arrangement::{JOINED_M, LineArrangement, PieceSet, Segment},
     readings::{Outcome, Readings},
+    square::oblique_price,
     workspace::Workspace,
 };
 
@@ -78,7 +79,12 @@ impl<'a> Judge<'a> {
 
     /// Scores walls, nats.
     pub(crate) fn score_segments(&self, segments: &[Segment]) -> f64 {
-        self.log_likelihood(segments) - price(segments)
+        self.log_likelihood(segments) - price(segments) - self.oblique_nats(segments)
+    }
+
+    /// Price of directions off right angles, nats; 0 without that assumption.
+    pub(crate) fn oblique_nats(&self, segments: &[Segment]) -> f64 {
+        self.workspace.square_rad.map_or(0.0, |sigma_rad| oblique_price(segments, sigma_rad))
     }
 
     /// Log-likelihood of all readings, with the readings of an arc as one, nats.
@@ -119,7 +125,7 @@ impl<'a> Judge<'a> {
         };
         let pairs = readings.beams.iter().zip(predicted);
         let sum: f64 = pairs.map(|(beam, of)| of_beam((beam.outcome, outcome_of(of)))).sum();
-        sum / readings.beams_per_arc()
+        sum / readings.beams_per_arc
     }
 
     /// Scene with these walls, in their order.

@@ -30,8 +30,10 @@ mod normal;
 mod odometry;
 mod options;
 mod polish;
+mod pose_grid;
 mod posed;
 mod progress;
+mod range_errors;
 mod readings;
 mod refine;
 mod relocate;
@@ -43,6 +45,7 @@ mod scores;
 mod search;
 mod slam;
 mod spots;
+mod square;
 mod survey;
 mod symmetry;
 #[cfg(test)]
@@ -62,4 +65,4 @@ pub use result::{
 };
 pub use room::unknown_room;
 pub use scores::PlanScores;
-pub use survey::{resume_survey, score_plan, survey};
+pub use survey::{resume_survey, score_plan, score_refined_plan, survey};

@@ -14,22 +14,33 @@ pub struct OdometrySigma {
     pub m_per_m: f64,
     /// Standard deviation of the heading per metre driven, degrees.
     pub deg_per_m: f64,
+    /// Standard deviation of the position at each stop in addition, metres.
+    pub m_per_stop: f64,
+    /// Standard deviation of the heading at each stop in addition, degrees.
+    pub deg_per_stop: f64,
+    /// Positions are waypoints in one frame, independent of the headings, rather than driven
+    /// distances in the frame of the robot.
+    pub are_waypoints: bool,
 }
 
 impl Default for OdometrySigma {
     fn default() -> Self {
-        Self { m_per_m: 0.05, deg_per_m: 5.0 }
+        Self {
+            m_per_m: 0.05,
+            deg_per_m: 5.0,
+            m_per_stop: 0.005,
+            deg_per_stop: 0.5,
+            are_waypoints: false,
+        }
     }
 }
-
-/// Standard deviations in addition to those per metre driven, metres and degrees.
-const MIN_SIGMA: (f64, f64) = (0.005, 0.5);
 
 /// Relative pose between consecutive sweeps by odometry.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Move {
-    /// Displacement in the frame of the first pose, metres.
+    /// Displacement, metres: in the frame of the first pose, or in that of the waypoints.
     by: DVec2,
+    are_waypoints: bool,
     turned_deg: f64,
     pub(crate) sigma_m: f64,
     pub(crate) sigma_deg: f64,
@@ -37,13 +48,15 @@ pub(crate) struct Move {
 
 impl Move {
     pub(crate) fn new(from: &Pose, to: &Pose, sigma: OdometrySigma) -> Self {
-        let by = in_frame(from, to.position());
+        let is_turned = !sigma.are_waypoints;
+        let by = displacement(from, to.position(), is_turned);
         let driven_m = by.length();
         Self {
             by,
+            are_waypoints: sigma.are_waypoints,
             turned_deg: wrap_180(to.heading_deg - from.heading_deg),
-            sigma_m: sigma.m_per_m * driven_m + MIN_SIGMA.0,
-            sigma_deg: sigma.deg_per_m * driven_m + MIN_SIGMA.1,
+            sigma_m: sigma.m_per_m * driven_m + sigma.m_per_stop,
+            sigma_deg: sigma.deg_per_m * driven_m + sigma.deg_per_stop,
         }
     }
 
@@ -54,9 +67,17 @@ impl Move {
 
     /// Pose after the move.
     pub(crate) fn from(&self, pose: &Pose) -> Pose {
-        let by = DVec2::from_angle(pose.heading_deg.to_radians()).rotate(self.by);
+        let by = self.axis(pose).rotate(self.by);
         let heading_deg = wrap_180(pose.heading_deg + self.turned_deg);
         Pose { x_m: pose.x_m + by.x, y_m: pose.y_m + by.y, heading_deg }
+    }
+
+    /// First axis of the frame of displacements.
+    fn axis(&self, from: &Pose) -> DVec2 {
+        match self.are_waypoints {
+            true => DVec2::X,
+            false => DVec2::from_angle(from.heading_deg.to_radians()),
+        }
     }
 
     /// Negative log-density of a pair of poses relative to that of the likeliest pair, nats.
@@ -76,10 +97,9 @@ impl Move {
     ) {
         /// Odometry is not robust: its errors are its only bound.
         const NORMAL: f64 = 1e3;
-        let turned = in_frame(from, to.position());
-        let axes = [DVec2::X, DVec2::Y]
-            .map(|axis| DVec2::from_angle(from.heading_deg.to_radians()).rotate(axis));
-        let by_heading = -turned.perp();
+        let turned = displacement(from, to.position(), !self.are_waypoints);
+        let axes = [DVec2::X, DVec2::Y].map(|axis| self.axis(from).rotate(axis));
+        let by_heading = if self.are_waypoints { DVec2::ZERO } else { -turned.perp() };
         for (axis, (unit, by_rad)) in axes.iter().zip(by_heading.to_array()).enumerate() {
             let mut row = Vec::with_capacity(5);
             if let Some(at) = of_from {
@@ -105,14 +125,29 @@ pub(crate) fn in_frame_of_first(poses: &[Pose], start: &Pose) -> Vec<Pose> {
     poses.iter().map(to).collect()
 }
 
-fn in_frame(pose: &Pose, point: DVec2) -> DVec2 {
-    DVec2::from_angle(-pose.heading_deg.to_radians()).rotate(point - pose.position())
+/// Displacement from a pose to a point, in the frame of the pose if `is_turned`.
+fn displacement(pose: &Pose, point: DVec2, is_turned: bool) -> DVec2 {
+    let turn = if is_turned { DVec2::from_angle(-pose.heading_deg.to_radians()) } else { DVec2::X };
+    turn.rotate(point - pose.position())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::normal::move_pose;
+
+    #[test]
+    fn waypoints_are_independent_of_headings() {
+        let sigma = OdometrySigma { are_waypoints: true, ..OdometrySigma::default() };
+        let pose = |x_m, heading_deg| Pose { x_m, y_m: 0.5, heading_deg };
+        let moved = Move::new(&pose(0.0, 10.0), &pose(1.0, 20.0), sigma);
+        // Both turned by 40 degrees.
+        let [from, to] = [pose(0.0, 50.0), pose(1.0, 60.0)];
+        assert!(moved.loss(&from, &to) < 1e-12);
+        assert!((moved.from(&from).x_m - 1.0).abs() < 1e-12);
+        let driven = Move::new(&pose(0.0, 10.0), &pose(1.0, 20.0), OdometrySigma::default());
+        assert!(driven.loss(&from, &to) > 10.0);
+    }
 
     #[test]
     fn moves_lead_from_pose_to_pose() {

@@ -7,6 +7,14 @@ use crate::{error::SurveyError, odometry::OdometrySigma};
 pub struct SurveyOptions {
     /// Errors of the sweeps' poses as odometry; `None` to ignore these poses.
     pub odometry: Option<OdometrySigma>,
+    /// Standard deviation of ranges, metres; `None` for 4 mm plus the step of a ranger that reports
+    /// in steps (root of the sum of squares).
+    pub range_sigma_m: Option<f64>,
+    /// Angle over which readings have one error because they share an arc, degrees: so many are
+    /// counted as one, at most 8.
+    pub arc_deg: f64,
+    /// Minimum number of beams of an arc; `None` for as many as fit into 5.4 degrees, at most 3.
+    pub min_arc_beams: Option<usize>,
     /// Standard deviation of directions of walls from a common square axis, degrees; `None` for any
     /// directions.
     pub square_deg: Option<f64>,
@@ -20,6 +28,9 @@ impl Default for SurveyOptions {
     fn default() -> Self {
         Self {
             odometry: Some(OdometrySigma::default()),
+            range_sigma_m: None,
+            arc_deg: 7.2,
+            min_arc_beams: None,
             square_deg: None,
             reflectance: 0.97,
             max_scenes: 30_000,
@@ -27,18 +38,13 @@ impl Default for SurveyOptions {
     }
 }
 
-/// Standard deviation of ranges in the final score, metres.
-pub(crate) const FINAL_SIGMA_M: f64 = 0.004;
-/// Maximum error of a range that counts as explained, metres.
-pub(crate) const EXPLAINED_M: f64 = 0.012;
-
 impl SurveyOptions {
     /// Checks that every value is in its range.
     ///
     /// # Errors
     /// The first value that is not.
     pub(crate) fn check(&self) -> Result<(), SurveyError> {
-        let Self { odometry, square_deg, reflectance, .. } = *self;
+        let Self { odometry, range_sigma_m, arc_deg, square_deg, reflectance, .. } = *self;
         let odometry = odometry.unwrap_or_default();
         let positive = "positive and finite";
         let checks = [
@@ -50,6 +56,15 @@ impl SurveyOptions {
             ),
             ("m_per_m", odometry.m_per_m, odometry.m_per_m > 0.0, positive),
             ("deg_per_m", odometry.deg_per_m, odometry.deg_per_m > 0.0, positive),
+            ("m_per_stop", odometry.m_per_stop, odometry.m_per_stop > 0.0, positive),
+            ("deg_per_stop", odometry.deg_per_stop, odometry.deg_per_stop > 0.0, positive),
+            (
+                "range_sigma_m",
+                range_sigma_m.unwrap_or(1.0),
+                range_sigma_m.unwrap_or(1.0) > 0.0,
+                positive,
+            ),
+            ("arc_deg", arc_deg, arc_deg > 0.0, positive),
             ("square_deg", square_deg.unwrap_or(1.0), square_deg.unwrap_or(1.0) > 0.0, positive),
         ];
         for (name, value, is_valid, expected) in checks {

@@ -95,11 +95,12 @@ fn error_model(posed: &PosedPlan, judge: &Judge) -> Option<ErrorModel> {
 /// Measured minus predicted ranges of each explained arc, in order, metres.
 fn errors_by_arc(posed: &PosedPlan, judge: &Judge) -> Option<Vec<Vec<f64>>> {
     const GATE_M: f64 = 0.03;
+    let gate_m = judge.workspace.errors.gate_m(GATE_M);
     let own = judge.at_poses(&posed.poses);
     let (_, predictions) = own.predictions(&posed.plan.segments(&posed.walls))?;
     let of_arc = |arc: &Arc| {
         let (readings, predictions) = (&own.readings()[arc.sweep], &predictions[arc.sweep]);
-        let explained = explain(arc, readings, predictions, GATE_M, 0.5)?;
+        let explained = explain(arc, readings, predictions, gate_m, 0.5)?;
         let mut errors_m = explained.range_errors_m(readings, predictions);
         errors_m.sort_by(f64::total_cmp);
         Some(errors_m)

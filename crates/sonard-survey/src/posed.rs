@@ -6,6 +6,7 @@ use crate::{
     arrangement::{LineArrangement, PieceSet},
     line::{off_square_rad, square_axis},
     normal::NormalEquations,
+    square::MAX_OFF_RAD,
 };
 
 /// Plan with its poses.
@@ -72,7 +73,6 @@ impl LineColumns {
         plan: &LineArrangement,
         sigma_rad: f64,
     ) {
-        const MAX_OFF_RAD: f64 = 0.12;
         let used = plan.lines.iter().zip(self.lines()).filter(|(_, at)| at.is_some());
         let lines: Vec<_> = used.map(|(line, _)| line.clone()).collect();
         let Some(axis_rad) = square_axis(&lines) else { return };

@@ -3,6 +3,8 @@
 use sonard_inverse::{FiringOutcome, FitSweep, World};
 use sonard_model::geometry::{Pose, wrap_360};
 
+use crate::options::SurveyOptions;
+
 /// Outcome of a beam, as measured or predicted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Outcome {
@@ -30,11 +32,22 @@ pub(crate) struct Readings {
     pub(crate) beams: Vec<Beam>,
     /// Median angle between neighbouring beams, degrees.
     pub(crate) step_deg: f64,
+    /// Number of neighbouring beams whose errors are correlated because they share an arc.
+    pub(crate) beams_per_arc: f64,
+    /// Minimum number of beams of an arc.
+    pub(crate) min_arc_beams: usize,
 }
 
 impl Readings {
     /// Readings of a sweep; an echo beyond the maximum range of the model counts as none.
-    pub(crate) fn new(sweep: &FitSweep, world: &World, max_range_m: f64) -> Self {
+    pub(crate) fn new(
+        sweep: &FitSweep,
+        world: &World,
+        max_range_m: f64,
+        options: &SurveyOptions,
+    ) -> Self {
+        /// Maximum number of beams that count as one.
+        const MAX_PER_ARC: f64 = 8.0;
         let sound_speed_m_s = world.air.sound_speed_m_s();
         let outcome = |outcome: FiringOutcome| match (outcome, outcome.range_m(sound_speed_m_s)) {
             (_, Some(range_m)) if range_m - world.delay_m <= max_range_m => {
@@ -57,7 +70,15 @@ impl Readings {
         gaps.retain(|gap| *gap > 1e-9);
         gaps.sort_by(f64::total_cmp);
         let step_deg = gaps.get(gaps.len() / 2).copied().unwrap_or(360.0);
-        Self { odometry: sweep.pose, beams, step_deg }
+        // Three beams of a fine sweep, one of a coarse one.
+        let by_step = (5.4 / step_deg).ceil().clamp(1.0, 3.0) as usize;
+        Self {
+            odometry: sweep.pose,
+            beams,
+            step_deg,
+            beams_per_arc: (options.arc_deg / step_deg).clamp(1.0, MAX_PER_ARC),
+            min_arc_beams: options.min_arc_beams.unwrap_or(by_step),
+        }
     }
 
     /// Angle from a beam to the following one, degrees; the first follows the last.
@@ -65,11 +86,5 @@ impl Readings {
         let next = &self.beams[(at + 1) % self.beams.len()];
         let gap = wrap_360(next.azimuth_deg - self.beams[at].azimuth_deg);
         if self.beams.len() == 1 { 360.0 } else { gap }
-    }
-
-    /// Number of neighbouring beams whose errors are correlated because they share an arc: as many
-    /// as fit into 7.2 degrees, at most 8.
-    pub(crate) fn beams_per_arc(&self) -> f64 {
-        (7.2 / self.step_deg).clamp(1.0, 8.0)
     }
 }

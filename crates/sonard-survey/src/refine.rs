@@ -135,11 +135,11 @@ fn equations(
     let own = judge.at_poses(&posed.poses);
     let (simulator, predictions) = own.predictions(&posed.plan.segments(&posed.walls))?;
     let runs = posed.plan.runs(&posed.walls);
-    let rows = RowBuilder::new(posed, columns, &simulator, &runs);
+    let rows = RowBuilder::new(posed, columns, (&simulator, judge.workspace.errors), &runs);
     let mut normal = NormalEquations::new(columns.count());
     for (sweep, arcs) in judge.workspace.arcs.iter().enumerate() {
         let (readings, predictions) = (&judge.readings()[sweep], &predictions[sweep]);
-        let predicted = predicted_arcs(sweep, readings, predictions);
+        let predicted = predicted_arcs(sweep, readings, predictions, judge.workspace.errors);
         for arc in arcs {
             let explained = explain(arc, readings, predictions, settings.gate_m, SHARE);
             if let Some(explained) = explained.filter(|of| of.beams.len() >= 2.min(arc.beams.len()))

@@ -6,8 +6,8 @@ use sonard_inverse::{CoarseGrid, locate};
 use sonard_model::geometry::Pose;
 
 use crate::{
-    judge::Judge, odometry::in_frame_of_first, options::EXPLAINED_M, posed::PosedPlan,
-    symmetry::pose_score, trace::unexplained,
+    judge::Judge, odometry::in_frame_of_first, posed::PosedPlan, symmetry::pose_score,
+    trace::unexplained,
 };
 
 /// Share of its arcs unexplained from which a sweep may be lost, with odometry and without.
@@ -21,9 +21,10 @@ const MAX_LOST: f64 = 0.5;
 /// a better one.
 pub(crate) fn relocated(posed: &PosedPlan, judge: &Judge) -> Option<Vec<Pose>> {
     let workspace = judge.workspace;
+    let explained_m = workspace.errors.explained_m();
     let segments = posed.plan.segments(&posed.walls);
     let (simulator, predictions) = judge.predictions(&segments)?;
-    let left = unexplained(&workspace.arcs, &workspace.readings, &predictions, EXPLAINED_M);
+    let left = unexplained(&workspace.arcs, &workspace.readings, &predictions, explained_m);
     let lost_share = LOST_SHARE[usize::from(workspace.moves.is_empty())];
     let is_lost = |sweep: &usize| {
         let of_sweep = left.iter().filter(|arc| arc.sweep == *sweep).count();

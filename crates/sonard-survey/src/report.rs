@@ -8,7 +8,7 @@ use crate::{
     arrangement::LineArrangement,
     covariance::PlanCovariance,
     judge::{Judge, outcome_of},
-    options::{EXPLAINED_M, FINAL_SIGMA_M, SurveyOptions},
+    options::SurveyOptions,
     posed::PosedPlan,
     readings::{Beam, Outcome},
     result::{
@@ -28,16 +28,22 @@ pub(crate) fn report(
     workspace: &Workspace,
     (end, options): (SearchEnd, &SurveyOptions),
 ) -> Survey {
-    let judge = Judge::new(workspace, &posed.poses, FINAL_SIGMA_M);
+    let judge = Judge::new(workspace, &posed.poses, workspace.errors.final_sigma_m());
+    let explained_m = workspace.errors.explained_m();
     let score = judge.score(&posed.plan, &posed.walls);
     let predictions = judge.predictions(&posed.plan.segments(&posed.walls));
     let predictions = predictions.map(|(_, predictions)| predictions).unwrap_or_default();
     let left = match predictions.is_empty() {
         true => workspace.arcs.iter().flatten().collect(),
-        false => unexplained(&workspace.arcs, &workspace.readings, &predictions, EXPLAINED_M),
+        false => unexplained(&workspace.arcs, &workspace.readings, &predictions, explained_m),
     };
     let causes = workspace.readings.iter().zip(&predictions).map(|(readings, predictions)| {
-        readings.beams.iter().zip(predictions).map(|(beam, of)| cause(beam, of)).collect()
+        readings
+            .beams
+            .iter()
+            .zip(predictions)
+            .map(|(beam, of)| cause(beam, of, explained_m))
+            .collect()
     });
     let covariance = covariance.as_ref();
     let equivalent = equivalent_poses(posed, &judge);
@@ -65,6 +71,7 @@ pub(crate) fn report(
             })
             .collect(),
         score,
+        oblique_nats: judge.oblique_nats(&posed.plan.segments(&posed.walls)),
         arcs: workspace.arcs.iter().map(Vec::len).sum(),
         unexplained: left
             .iter()
@@ -123,11 +130,11 @@ fn surveyed(
     }
 }
 
-fn cause(beam: &Beam, prediction: &Prediction) -> ReadingCause {
+fn cause(beam: &Beam, prediction: &Prediction, explained_m: f64) -> ReadingCause {
     let path = prediction.arrival.as_ref().map(|arrival| &arrival.path);
     match (beam.outcome, outcome_of(prediction), path) {
         (Outcome::Echo(measured_m), Outcome::Echo(expected_m), Some(path))
-            if (measured_m - expected_m).abs() < EXPLAINED_M =>
+            if (measured_m - expected_m).abs() < explained_m =>
         {
             match path.kind() {
                 PathKind::Diffracted => ReadingCause::Edge,

@@ -18,6 +18,8 @@ pub struct Survey {
     /// Score of the plan, nats: log-likelihood of the readings, those of an arc as one, less the
     /// price of the walls.
     pub score: f64,
+    /// Part of that price for directions off right angles, nats; 0 without that assumption.
+    pub oblique_nats: f64,
     /// Number of arcs in all sweeps.
     pub arcs: usize,
     /// Arcs that the plan does not explain.

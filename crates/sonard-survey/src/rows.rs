@@ -12,6 +12,7 @@ use crate::{
     feature::VirtualFeature,
     normal::{NormalEquations, pose_column},
     posed::{LineColumns, PosedPlan},
+    range_errors::RangeErrors,
     trace::ExplainedArc,
 };
 
@@ -29,6 +30,7 @@ pub(crate) struct RowBuilder<'a> {
     posed: &'a PosedPlan,
     columns: &'a LineColumns,
     simulator: &'a Simulator,
+    errors: RangeErrors,
     runs: &'a [Run],
     motions: Vec<(usize, SceneMotion)>,
 }
@@ -37,10 +39,17 @@ impl<'a> RowBuilder<'a> {
     pub(crate) fn new(
         posed: &'a PosedPlan,
         columns: &'a LineColumns,
-        simulator: &'a Simulator,
+        (simulator, errors): (&'a Simulator, RangeErrors),
         runs: &'a [Run],
     ) -> Self {
-        Self { posed, columns, simulator, runs, motions: motions(&posed.plan, runs, columns) }
+        Self {
+            posed,
+            columns,
+            simulator,
+            errors,
+            runs,
+            motions: motions(&posed.plan, runs, columns),
+        }
     }
 
     /// Adds range and bearing of an arc, measured minus predicted.
@@ -65,7 +74,7 @@ impl<'a> RowBuilder<'a> {
         if !is_known {
             return;
         }
-        let sigma_m = SIGMA_M[usize::from(errors_m.len() <= FEW_BEAMS)];
+        let sigma_m = self.errors.sigma_m(SIGMA_M[usize::from(errors_m.len() <= FEW_BEAMS)]);
         normal.add(&self.range_row(path, arc.sweep), median(errors_m), sigma_m, ROBUST);
         let off_deg = |other: &&Arc| wrap_180(other.azimuth_deg - arc.azimuth_deg).abs();
         let same = predicted
@@ -74,7 +83,8 @@ impl<'a> RowBuilder<'a> {
             .min_by(|a, b| off_deg(a).total_cmp(&off_deg(b)));
         if let Some(same) = same {
             let is_cut = arc.is_cut || same.is_cut;
-            let sigma_deg = SIGMA_DEG * if is_cut { CUT_SIGMA } else { 1.0 };
+            let sigma_deg =
+                SIGMA_DEG * self.errors.bearing_factor() * if is_cut { CUT_SIGMA } else { 1.0 };
             let off_rad = wrap_180(arc.azimuth_deg - same.azimuth_deg).to_radians();
             let row = self.bearing_row(path, arc.sweep);
             normal.add(&row, off_rad, sigma_deg.to_radians(), ROBUST);

@@ -163,9 +163,12 @@ fn mismatch(feature: &VirtualFeature, arc: &Arc, pose: &Pose, gate_m: f64) -> Op
     let (range_m, bearing_rad) = feature.predict(pose.position());
     let off_m = (range_m - arc.range_m).abs();
     let off_deg = wrap_pi(pose.direction_rad(arc.azimuth_deg) - bearing_rad).to_degrees().abs();
-    let gate_deg = GATE_DEG * if arc.is_cut { CUT_GATE } else { 1.0 };
+    let gate_m = arc.errors.gate_m(gate_m);
+    let gate_deg = GATE_DEG * arc.errors.bearing_factor() * if arc.is_cut { CUT_GATE } else { 1.0 };
     let is_near = off_m < gate_m && off_deg < gate_deg;
-    is_near.then(|| (off_m / SIGMA_M).powi(2) + (off_deg / arc.sigma_deg()).powi(2))
+    is_near.then(|| {
+        (off_m / arc.errors.sigma_m(SIGMA_M)).powi(2) + (off_deg / arc.sigma_deg()).powi(2)
+    })
 }
 
 /// Fits all features and returns those that keep two or more arcs after each arc went to the

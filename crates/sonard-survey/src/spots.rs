@@ -10,7 +10,6 @@ use sonard_model::{
 use crate::{
     arrangement::{JOINED_M, LineArrangement, PieceSet, Run},
     judge::{Judge, Predictions},
-    options::EXPLAINED_M,
     trace::{ExplainedArc, explain},
 };
 
@@ -93,13 +92,14 @@ fn consistent_arcs<'a>(
     predictions: &'a Predictions,
 ) -> Option<Vec<ExplainedArc<'a>>> {
     let workspace = judge.workspace;
+    let explained_m = workspace.errors.explained_m();
     let is_lone = workspace.moves.is_empty();
     let min_share = MIN_EXPLAINED[usize::from(is_lone)];
     let mut all = Vec::new();
     for (arcs, (readings, predictions)) in
         workspace.arcs.iter().zip(judge.readings().iter().zip(predictions))
     {
-        let of = |arc| explain(arc, readings, predictions, EXPLAINED_M, SHARE);
+        let of = |arc| explain(arc, readings, predictions, explained_m, SHARE);
         let explained: Vec<ExplainedArc> = arcs.iter().filter_map(of).collect();
         if (explained.len() as f64) < min_share * arcs.len() as f64 {
             return None;

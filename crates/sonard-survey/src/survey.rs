@@ -17,12 +17,13 @@ use crate::{
     covariance::PlanCovariance,
     error::SurveyError,
     judge::Judge,
-    line::{Line, off_square_rad, square_axis},
     odometry::Move,
-    options::{EXPLAINED_M, FINAL_SIGMA_M, SurveyOptions},
+    options::SurveyOptions,
     polish::polish,
+    pose_grid::improve_poses,
     posed::PosedPlan,
     progress::{NoObserver, SurveyObserver, SurveyProgress, SurveyStage},
+    range_errors::RangeErrors,
     readings::Readings,
     refine::{RefineSettings, refine},
     relocate::relocated,
@@ -30,12 +31,13 @@ use crate::{
     result::{SearchEnd, Survey},
     scores::PlanScores,
     search::{PlanSearch, initial_walls},
-    slam::{VirtualMap, map_of_poses, virtual_map, virtual_map_in_order},
+    slam::{VirtualMap, map_of_poses, reassociated, virtual_map, virtual_map_in_order},
+    square::square_lines,
     trace::unexplained,
     workspace::Workspace,
 };
 
-/// Round of the search for walls.
+/// Round of the search for walls with a fine ranger.
 struct Round {
     /// Standard deviation of ranges, metres.
     sigma_m: f64,
@@ -48,7 +50,7 @@ struct Round {
 const ROUNDS: [Round; 3] = [
     Round { sigma_m: 0.012, gate_m: 0.03, max_lines: 26 },
     Round { sigma_m: 0.006, gate_m: 0.012, max_lines: 30 },
-    Round { sigma_m: FINAL_SIGMA_M, gate_m: 0.012, max_lines: 30 },
+    Round { sigma_m: 0.004, gate_m: 0.012, max_lines: 30 },
 ];
 /// Maximum number of restarts from the long walls.
 const MAX_RESTARTS: usize = 2;
@@ -120,9 +122,36 @@ pub fn score_plan(
 ) -> Result<f64, SurveyError> {
     let scores = PlanScores::default();
     let workspace = workspace(world, sweeps, options, (&NoObserver, &scores))?;
-    let judge = Judge::new(&workspace, poses, FINAL_SIGMA_M);
+    let judge = Judge::new(&workspace, poses, workspace.errors.final_sigma_m());
     let segment = |(line, &[a, b]): (usize, &[DVec2; 2])| Segment { line, a, b };
     Ok(judge.score_segments(&walls.iter().enumerate().map(segment).collect::<Vec<_>>()))
+}
+
+/// Score of given walls (pairs of ends, metres) and poses after a refinement as that of a survey,
+/// nats.
+///
+/// # Errors
+/// As [`survey`].
+pub fn score_refined_plan(
+    world: &World,
+    sweeps: &[FitSweep],
+    options: &SurveyOptions,
+    walls: &[[DVec2; 2]],
+    poses: &[Pose],
+) -> Result<f64, SurveyError> {
+    let scores = PlanScores::default();
+    let workspace = workspace(world, sweeps, options, (&NoObserver, &scores))?;
+    let mut search = SurveySearch::new(&workspace, options);
+    let (plan, walls) = LineArrangement::of_walls(walls, poses, workspace.reach_m());
+    search.posed = PosedPlan { plan, walls, poses: poses.to_vec() };
+    for (number, round) in ROUNDS.iter().enumerate() {
+        let sigma_m = workspace.errors.sigma_m(round.sigma_m);
+        let judge = Judge::new(&workspace, &search.posed.poses, sigma_m);
+        search.improve_poses(&judge, number);
+        let judge = Judge::new(&workspace, &search.posed.poses, sigma_m);
+        search.refine(&judge, workspace.errors.gate_m(round.gate_m));
+    }
+    Ok(search.score_now(workspace.errors.final_sigma_m()))
 }
 
 pub(crate) fn workspace<'a>(
@@ -135,15 +164,18 @@ pub(crate) fn workspace<'a>(
         return Err(SurveyError::TooFewSweeps(sweeps.len()));
     }
     options.check()?;
+    let errors = RangeErrors::new(&world.sensor, options);
     let world = &empty_world(world, options.reflectance);
     let simulator = world.simulator(&sweeps[0].pose)?;
     let max_range_m = simulator.receiver().max_range_m;
     let readings: Vec<Readings> =
-        sweeps.iter().map(|sweep| Readings::new(sweep, world, max_range_m)).collect();
+        sweeps.iter().map(|sweep| Readings::new(sweep, world, max_range_m, options)).collect();
     let poses: Vec<Pose> = sweeps.iter().map(|sweep| sweep.pose).collect();
     let between = |sigma| Move::between(&poses, sigma);
     let moves = options.odometry.map_or_else(Vec::new, between);
-    let workspace = Workspace::new((world.clone(), simulator), sweeps, readings, moves, watched);
+    let mut workspace =
+        Workspace::new((world.clone(), simulator), sweeps, (readings, errors), moves, watched);
+    workspace.square_rad = options.square_deg.map(f64::to_radians);
     let without = workspace.arcs.iter().zip(sweeps).find(|(arcs, _)| arcs.is_empty());
     match without {
         Some((_, sweep)) => Err(SurveyError::NoArcs(sweep.scan)),
@@ -151,7 +183,8 @@ pub(crate) fn workspace<'a>(
     }
 }
 
-/// World of an empty scene with the material of the walls, the transducer on the axis.
+/// World of an empty scene with the material of the walls, the transducer on the axis: ranges are
+/// from there.
 fn empty_world(world: &World, reflectance: f64) -> World {
     let mut world = world.clone();
     let mut scene = Scene::clone(&world.scene);
@@ -160,7 +193,10 @@ fn empty_world(world: &World, reflectance: f64) -> World {
     scene.robot = None;
     scene.materials = [("wall".to_owned(), Material { reflectance, roughness: 0.0 })].into();
     world.scene = Arc::new(scene);
+    // Rounded predictions have no derivatives; the step is part of the errors of ranges.
+    world.sensor.range_step_m = 0.0;
     let mounting = &mut world.sensor.mounting;
+    world.delay_m -= mounting.ahead_m;
     (mounting.ahead_m, mounting.left_m, mounting.separation_m) = (0.0, 0.0, 0.0);
     world
 }
@@ -191,7 +227,15 @@ impl<'a> SurveySearch<'a> {
         let mut search =
             Self { workspace, options, features: Vec::new(), posed, covariance: None, score: None };
         search.report_progress(SurveyStage::Course);
-        search.begin(virtual_map(&workspace.arcs, start, &workspace.moves));
+        if workspace.errors.is_coarse() && options.odometry.is_some() {
+            // Few arcs, which cut each other, determine poses less well than odometry.
+            let readings = workspace.readings.iter();
+            let poses: Vec<Pose> = readings.map(|readings| readings.odometry).collect();
+            search.features = reassociated(&[], &workspace.arcs, &poses);
+            search.posed = PosedPlan::without_walls(poses);
+        } else {
+            search.begin(virtual_map(&workspace.arcs, start, &workspace.moves));
+        }
         search
     }
 
@@ -262,19 +306,24 @@ impl<'a> SurveySearch<'a> {
     /// Completes boxes of which faces are found, or echoes remain unexplained, one after the other.
     fn find_boxes(&mut self) {
         for _ in 0..MAX_BOXES {
-            let judge = Judge::new(self.workspace, &self.posed.poses, FINAL_SIGMA_M);
+            let sigma_m = self.errors().final_sigma_m();
+            let judge = Judge::new(self.workspace, &self.posed.poses, sigma_m);
             let grown =
                 (!self.workspace.is_over()).then(|| with_box(&self.posed, &judge, &self.left()));
             let Some(grown) = grown.flatten() else { break };
             let before = self.state();
             self.posed = grown;
-            self.refine(&judge, ROUNDS[ROUNDS.len() - 1].gate_m);
+            self.refine(&judge, self.errors().gate_m(ROUNDS[ROUNDS.len() - 1].gate_m));
             self.rounds(ROUNDS.len() - 1);
             if self.score < before.score {
                 self.restore(before);
                 break;
             }
         }
+    }
+
+    fn errors(&self) -> RangeErrors {
+        self.workspace.errors
     }
 
     fn state(&self) -> SearchState<'a> {
@@ -292,7 +341,8 @@ impl<'a> SurveySearch<'a> {
     /// with these poses.
     fn find_lost_sweeps(&mut self) {
         for _ in 0..MAX_RESTARTS {
-            let judge = Judge::new(self.workspace, &self.posed.poses, FINAL_SIGMA_M);
+            let judge =
+                Judge::new(self.workspace, &self.posed.poses, self.errors().final_sigma_m());
             let moved = (!self.workspace.is_over()).then(|| relocated(&self.posed, &judge));
             let Some(poses) = moved.flatten() else { break };
             let before = self.state();
@@ -326,10 +376,9 @@ impl<'a> SurveySearch<'a> {
     /// Runs rounds from a number on, until no arc is left or a round gains nothing.
     fn rounds(&mut self, first: usize) {
         for number in first..MAX_ROUNDS {
-            let round = &ROUNDS[number.min(ROUNDS.len() - 1)];
             self.report_progress(SurveyStage::Walls { round: number + 1 });
             let before = self.score.filter(|_| number >= ROUNDS.len());
-            self.round(round, number == 0);
+            self.round(number);
             let is_settled = before
                 .is_some_and(|before| self.score.is_some_and(|now| now < before + MIN_ROUND_GAIN));
             let is_done = number + 1 >= ROUNDS.len() && self.left().is_empty();
@@ -340,7 +389,13 @@ impl<'a> SurveySearch<'a> {
     }
 
     /// Chooses lines, searches walls on them, and refines poses and lines.
-    fn round(&mut self, round: &Round, is_first: bool) {
+    fn round(&mut self, number: usize) {
+        let round = &ROUNDS[number.min(ROUNDS.len() - 1)];
+        let is_first = number == 0;
+        if self.errors().is_coarse() && !is_first {
+            let poses = &self.posed.poses;
+            self.features = reassociated(&self.features, &self.workspace.arcs, poses);
+        }
         for of in &mut self.features {
             fit_feature(of, &self.posed.poses);
         }
@@ -350,12 +405,24 @@ impl<'a> SurveySearch<'a> {
         } else {
             plan.transfer(&self.posed.plan, &self.posed.walls)
         };
-        let judge = Judge::new(self.workspace, &self.posed.poses, round.sigma_m);
+        let sigma_m = self.errors().sigma_m(round.sigma_m);
+        let judge = Judge::new(self.workspace, &self.posed.poses, sigma_m);
         let search = PlanSearch { plan: &plan, judge: &judge, excluded: None };
         let found = search.trim(search.climb(walls));
         (self.posed.plan, self.posed.walls) = (plan, found.walls);
-        self.refine(&judge, round.gate_m);
-        self.score = Some(self.score_now(round.sigma_m));
+        self.improve_poses(&judge, number);
+        self.refine(&judge, self.errors().gate_m(round.gate_m));
+        self.score = Some(self.score_now(sigma_m));
+    }
+
+    /// Moves poses by the likelihood of a coarse ranger's readings, less far with each round.
+    fn improve_poses(&mut self, judge: &Judge, number: usize) {
+        /// Spans of the first round, metres and degrees.
+        const SPANS: [f64; 2] = [0.03, 8.0];
+        if self.errors().is_coarse() {
+            let parts = (number.min(ROUNDS.len() - 1) + 1) as f64;
+            improve_poses(&mut self.posed, judge, SPANS.map(|span| span / parts));
+        }
     }
 
     fn refine(&mut self, judge: &Judge, gate_m: f64) {
@@ -385,7 +452,7 @@ impl<'a> SurveySearch<'a> {
         };
         let mut lines = sources.lines(round.max_lines);
         if self.options.square_deg.is_some() {
-            square(&mut lines, poses);
+            square_lines(&mut lines, poses);
         }
         LineArrangement::new(lines, poses, self.workspace.reach_m())
     }
@@ -396,9 +463,12 @@ impl<'a> SurveySearch<'a> {
         let segments = self.posed.plan.segments(&self.posed.walls);
         let workspace = self.workspace;
         match judge.predictions(&segments) {
-            Some((_, predictions)) => {
-                unexplained(&workspace.arcs, &workspace.readings, &predictions, EXPLAINED_M)
-            }
+            Some((_, predictions)) => unexplained(
+                &workspace.arcs,
+                &workspace.readings,
+                &predictions,
+                self.errors().explained_m(),
+            ),
             None => workspace.arcs.iter().flatten().collect(),
         }
     }
@@ -418,16 +488,18 @@ impl<'a> SurveySearch<'a> {
     /// Judges the walls; continues with an alternative that is better.
     fn settle(&mut self) -> Assessment {
         let last = &ROUNDS[ROUNDS.len() - 1];
+        let errors = self.errors();
         for is_last in [false, false, true] {
-            let judge = Judge::new(self.workspace, &self.posed.poses, last.sigma_m);
+            let sigma_m = errors.sigma_m(last.sigma_m);
+            let judge = Judge::new(self.workspace, &self.posed.poses, sigma_m);
             let square_rad = self.options.square_deg.map(f64::to_radians);
             polish(&mut self.posed, &judge, square_rad);
-            let judge = Judge::new(self.workspace, &self.posed.poses, last.sigma_m);
+            let judge = Judge::new(self.workspace, &self.posed.poses, sigma_m);
             let mut assessment = assess(&self.posed, &judge);
             match assessment.better.take().filter(|_| !is_last) {
                 Some(better) => {
                     self.posed.walls = better.walls;
-                    self.refine(&judge, last.gate_m);
+                    self.refine(&judge, errors.gate_m(last.gate_m));
                 }
                 None => return assessment,
             }
@@ -468,18 +540,4 @@ fn are_same_course(a: &[Pose], b: &[Pose]) -> bool {
             && wrap_180(a.heading_deg - b.heading_deg).abs() < NEAR_DEG
     };
     a.iter().zip(b).all(is_same)
-}
-
-/// Turns lines to the nearest direction of a common square axis.
-fn square(lines: &mut [Line], poses: &[Pose]) {
-    const MAX_OFF_RAD: f64 = 0.12;
-    let supported: Vec<Line> = lines.iter().filter(|line| line.support >= 2).cloned().collect();
-    let Some(axis_rad) = square_axis(&supported) else { return };
-    let center = poses.iter().map(Pose::position).sum::<DVec2>() / poses.len().max(1) as f64;
-    for line in lines {
-        let off_rad = off_square_rad(line.normal_rad, axis_rad);
-        if off_rad.abs() < MAX_OFF_RAD {
-            *line = line.turned(-off_rad, center, poses);
-        }
-    }
 }

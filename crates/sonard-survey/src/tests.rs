@@ -1,6 +1,7 @@
 //! Tests of the stages against known rooms.
 
 mod boxes;
+mod coarse;
 mod rectangle;
 mod stages;
 mod undetermined;

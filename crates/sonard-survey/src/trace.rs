@@ -6,6 +6,7 @@ use crate::{
     arc::{Arc, find_arcs},
     arrangement::{LineArrangement, PieceSet, Run},
     judge::{Judge, Predictions, outcome_of},
+    range_errors::RangeErrors,
     readings::{Outcome, Readings},
 };
 
@@ -80,12 +81,13 @@ pub(crate) fn touched_pieces(
 ) -> Option<PieceSet> {
     const GATE_M: f64 = 0.02;
     const SHARE: f64 = 0.4;
+    let gate_m = judge.workspace.errors.gate_m(GATE_M);
     let (_, predictions) = judge.predictions(&plan.segments(walls))?;
     let runs = plan.runs(walls);
     let mut touched = PieceSet::new(plan.pieces());
     for arc in judge.workspace.arcs.iter().flatten() {
         let (readings, predictions) = (&judge.readings()[arc.sweep], &predictions[arc.sweep]);
-        if let Some(explained) = explain(arc, readings, predictions, GATE_M, SHARE)
+        if let Some(explained) = explain(arc, readings, predictions, gate_m, SHARE)
             && let Some(path) = explained.path()
         {
             mark(plan, &runs, path, &mut touched);
@@ -111,10 +113,11 @@ pub(crate) fn predicted_arcs(
     sweep: usize,
     readings: &Readings,
     predictions: &[Prediction],
+    errors: RangeErrors,
 ) -> Vec<Arc> {
     let mut predicted = readings.clone();
     for (beam, prediction) in predicted.beams.iter_mut().zip(predictions) {
         beam.outcome = outcome_of(prediction);
     }
-    find_arcs(sweep, &predicted)
+    find_arcs(sweep, &predicted, errors)
 }

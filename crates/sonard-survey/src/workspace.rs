@@ -9,6 +9,7 @@ use crate::{
     arc::{Arc, find_arcs},
     odometry::Move,
     progress::SurveyObserver,
+    range_errors::RangeErrors,
     readings::Readings,
     scores::PlanScores,
 };
@@ -21,6 +22,9 @@ pub(crate) struct Workspace<'a> {
     /// Simulator of that world, whose scene gives material and options, without walls.
     pub(crate) simulator: Simulator,
     pub(crate) readings: Vec<Readings>,
+    pub(crate) errors: RangeErrors,
+    /// Standard deviation of directions of walls from a square axis, radians.
+    pub(crate) square_rad: Option<f64>,
     /// Arcs by sweep.
     pub(crate) arcs: Vec<Vec<Arc>>,
     /// Odometry between consecutive sweeps; empty without odometry.
@@ -35,15 +39,28 @@ impl<'a> Workspace<'a> {
     pub(crate) fn new(
         (world, simulator): (World, Simulator),
         sweeps: &'a [FitSweep],
-        readings: Vec<Readings>,
+        (readings, errors): (Vec<Readings>, RangeErrors),
         moves: Vec<Move>,
         (observer, scores): (&'a dyn SurveyObserver, &'a PlanScores),
     ) -> Self {
         let numbered = readings.iter().enumerate();
-        let arcs = numbered.map(|(sweep, readings)| find_arcs(sweep, readings)).collect();
+        let arcs = numbered.map(|(sweep, readings)| find_arcs(sweep, readings, errors)).collect();
         let limit = AtomicUsize::new(usize::MAX);
         let scored = AtomicUsize::new(0);
-        Self { world, sweeps, simulator, readings, arcs, moves, observer, scores, scored, limit }
+        Self {
+            world,
+            sweeps,
+            simulator,
+            readings,
+            errors,
+            square_rad: None,
+            arcs,
+            moves,
+            observer,
+            scores,
+            scored,
+            limit,
+        }
     }
 
     /// Maximum range of the ranger, metres: the region around the poses with walls.

@@ -46,6 +46,12 @@ fn remarks(found: &Survey) -> Vec<String> {
             "{conjectured_m:.2} m of walls are conjectured: readings hardly depend on them"
         ));
     }
+    if found.oblique_nats > 0.05 {
+        remarks.push(format!(
+            "directions off right angles cost {:.1} nats of the score",
+            found.oblique_nats
+        ));
+    }
     let is_settled = matches!(found.end, SearchEnd::Complete | SearchEnd::UnexplainedArcs);
     if found.alternatives.is_empty() && is_settled {
         remarks.push("no other plan is within 10 nats of this one".to_owned());

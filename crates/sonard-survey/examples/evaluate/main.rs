@@ -145,7 +145,11 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
     }
     let [m_per_m, deg_per_m] = settings.odometry;
     let options = SurveyOptions {
-        odometry: settings.odometry_is_used.then_some(OdometrySigma { m_per_m, deg_per_m }),
+        odometry: settings.odometry_is_used.then_some(OdometrySigma {
+            m_per_m,
+            deg_per_m,
+            ..OdometrySigma::default()
+        }),
         square_deg: settings.square_deg,
         ..SurveyOptions::default()
     };

@@ -27,7 +27,7 @@ fn arcs_are_at_distances_of_walls_and_corners() {
     let scores = PlanScores::default();
     let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
     for (at, (readings, pose)) in workspace.readings.iter().zip(&poses).enumerate() {
-        let arcs = find_arcs(at, readings);
+        let arcs = find_arcs(at, readings, Default::default());
         let walls = sides(&corners);
         let of_walls = walls.iter().map(|[a, b]| {
             let normal = (*b - *a).perp().normalize();
