@@ -109,10 +109,15 @@ pub(crate) fn survey<'py>(
         return Err(PyValueError::new_err(message));
     };
     let options = SurveyOptions {
-        odometry: odometry.map(|(m_per_m, deg_per_m)| OdometrySigma { m_per_m, deg_per_m }),
+        odometry: odometry.map(|(m_per_m, deg_per_m)| OdometrySigma {
+            m_per_m,
+            deg_per_m,
+            ..OdometrySigma::default()
+        }),
         square_deg: square.then_some(SQUARE_DEG),
         reflectance,
         max_scenes,
+        ..SurveyOptions::default()
     };
     let mut given = Given { poses: None, azimuths_deg, sensor: None, air: None, max_range_m };
     given.air = air.map(|air| *air.get());

@@ -8,7 +8,7 @@ use crate::normal::NormalEquations;
 
 /// Error model of odometry between consecutive sweeps.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct OdometrySigma {
     /// Standard deviation of the position per metre driven, metres.
     pub m_per_m: f64,

@@ -142,6 +142,7 @@ fn options(request: &SurveyRequest) -> SurveyOptions {
         square_deg: request.square.then_some(SQUARE_DEG),
         reflectance: request.reflectance,
         max_scenes: request.max_scenes,
+        ..SurveyOptions::default()
     }
 }
 
