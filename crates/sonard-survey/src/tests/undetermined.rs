@@ -112,3 +112,28 @@ fn lost_sweep_is_located_in_the_plan_of_the_others() {
     assert!(off_m.iter().any(|off_m| *off_m < 0.005), "{off_m:?}");
     assert_eq!([found[0], found[1], found[3]], [truth[0], truth[1], truth[3]]);
 }
+
+/// An arc of clutter in each sweep is too little for a wrong pose, but more than a complete plan
+/// leaves in all sweeps together.
+#[test]
+fn walls_among_unexplained_arcs_are_not_observed() {
+    let (corners, truth) = (rectangle(), stops());
+    let world = world(&corners);
+    let clear = sweeps(&world, &truth, &truth);
+    let mut cluttered = clear.clone();
+    for sweep in &mut cluttered {
+        for beam in &mut sweep.beams[100..116] {
+            let tof_us = 2e6 * 0.35 / world.air.sound_speed_m_s();
+            beam.outcome = FiringOutcome::Echo { tof_us };
+        }
+    }
+    for (sweeps, is_observed) in [(clear, true), (cluttered, false)] {
+        let scores = PlanScores::default();
+        let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
+        let judge = Judge::new(&workspace, &truth, 0.004);
+        let (plan, walls) = plan_of(&sides(&corners), &truth);
+        let assessment = assess(&PosedPlan { plan, walls, poses: truth.clone() }, &judge);
+        let mut pieces = assessment.walls.iter().flat_map(|wall| &wall.pieces);
+        assert_eq!(pieces.any(|piece| piece.status == PieceStatus::Observed), is_observed);
+    }
+}
