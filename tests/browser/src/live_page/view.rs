@@ -45,8 +45,20 @@ fn faint_pixels(browser: &Browser) -> u64 {
     super::count_pixels(browser, "under", "d[i + 3] > 20")
 }
 
-/// Scale, origin, and whether the view was moved.
+/// Scale, origin, and whether the view was moved, once no event changes them any more.
 fn view(browser: &Browser, plan: &str) -> ([f64; 3], bool) {
+    let mut before = current_view(browser, plan);
+    for _ in 0..100 {
+        let now = current_view(browser, plan);
+        if now == before {
+            return now;
+        }
+        before = now;
+    }
+    panic!("the view keeps changing: {before:?}");
+}
+
+fn current_view(browser: &Browser, plan: &str) -> ([f64; 3], bool) {
     browser.until_drawn();
     let view =
         browser.eval(&format!("({plan}).then(({{view: v}}) => [v.scale, v.x0, v.y0, v.moved])"));
