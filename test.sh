@@ -358,7 +358,7 @@ run_tests() {
   fi | tee "$work/tests" | head -n "-$closing_lines"
 }
 
-# By nextest's configuration one browser test runs at a time.
+# By nextest's configuration browser tests run alone.
 test_page() {
   if [ "${PAGE:-1}" = 0 ] || [ "$runner" = nextest ]; then return; fi
   step "the live page"

@@ -10,7 +10,10 @@ use super::{
     drawn_pixels,
     workbench::until_has,
 };
-use sonard_test_support::daemon::{Daemon, write_token};
+use sonard_test_support::{
+    daemon::{Daemon, write_token},
+    wait_until,
+};
 
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 const WIDE: Screen = Screen { name: "wide", size: (1280, 1010), phone: false, dark: false };
@@ -42,6 +45,15 @@ fn surveyed_plan_takes_the_place_of_the_scene() {
         assert_eq!(daemon.send("POST", "/v1/start", &request).status, 202);
         daemon.wait_for_scans(scans);
     }
+    // A page that is opened now lists three scans with their ends.
+    wait_until("the ends of the scans", || {
+        let scans = daemon.get("/v1/scans?limit=10").json();
+        scans
+            .as_array()
+            .is_some_and(|of| of.iter().filter(|scan| scan["end"].is_object()).count() == 3)
+    });
+    browser.eval("location.reload()");
+    browser.until("document.getElementById('link').textContent === 'ready'");
     browser.until(COMPLETE);
     browser.until("document.querySelectorAll('#scans-list li').length === 3");
     let scene = browser.text("#floor-title");

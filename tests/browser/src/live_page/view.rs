@@ -19,6 +19,8 @@ fn pan_zoom_and_measure() {
     let browser = Browser::open(&address, DESK);
     scan_once(&daemon);
     browser.until(COMPLETE);
+    // The list of scans moves what is below it.
+    browser.until("document.querySelectorAll('#scans-list li').length === 1");
     check_view(&browser, LIVE);
     assert_clean(&browser);
 }
