@@ -5,7 +5,7 @@ use std::fs;
 use serde_json::json;
 
 use super::{
-    COMPLETE, assert_clean,
+    assert_clean,
     browser::{Browser, Screen},
     drawn_pixels,
     workbench::until_has,
@@ -54,7 +54,6 @@ fn surveyed_plan_takes_the_place_of_the_scene() {
     });
     browser.eval("location.reload()");
     browser.until("document.getElementById('link').textContent === 'ready'");
-    browser.until(COMPLETE);
     browser.until("document.querySelectorAll('#scans-list li').length === 3");
     let scene = browser.text("#floor-title");
     let before = drawn_pixels(&browser, "under");
