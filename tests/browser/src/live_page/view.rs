@@ -19,8 +19,9 @@ fn pan_zoom_and_measure() {
     let browser = Browser::open(&address, DESK);
     scan_once(&daemon);
     browser.until(COMPLETE);
-    // The list of scans moves what is below it.
+    // The list of scans, which is fetched again at the end of a scan, moves what is beside it.
     browser.until("document.querySelectorAll('#scans-list li').length === 1");
+    browser.eval("new Promise((done) => setTimeout(done, 1500))");
     check_view(&browser, LIVE);
     assert_clean(&browser);
 }
