@@ -35,8 +35,6 @@ use crate::{
 
 /// Interval between checks for interrupts.
 const INTERRUPT_INTERVAL: Duration = Duration::from_millis(50);
-/// Standard deviation of the directions of walls in a room that is mostly square.
-const SQUARE_DEG: f64 = 1.0;
 
 /// Reconstructs an unknown room and the poses of sweeps, as ``sonard survey`` does.
 ///
@@ -114,7 +112,7 @@ pub(crate) fn survey<'py>(
             deg_per_m,
             ..OdometrySigma::default()
         }),
-        square_deg: square.then_some(SQUARE_DEG),
+        square_deg: square.then_some(SurveyOptions::SQUARE_DEG),
         reflectance,
         max_scenes,
         ..SurveyOptions::default()

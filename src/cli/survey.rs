@@ -142,13 +142,11 @@ pub(super) fn run(args: &Args) -> Outcome {
 
 impl Args {
     fn options(&self) -> SurveyOptions {
-        /// Standard deviation of the directions of walls in a room that is mostly square.
-        const SQUARE_DEG: f64 = 1.0;
         SurveyOptions {
             odometry: (!self.no_odometry)
                 .then_some(OdometrySigma { are_waypoints: self.waypoints, ..self.odometry }),
             range_sigma_m: self.range_sigma,
-            square_deg: self.square.then_some(SQUARE_DEG),
+            square_deg: self.square.then_some(SurveyOptions::SQUARE_DEG),
             reflectance: self.reflectance,
             max_scenes: self.max_scenes,
             ..SurveyOptions::default()

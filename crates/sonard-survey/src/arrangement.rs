@@ -106,24 +106,19 @@ impl LineArrangement {
     pub(crate) fn of_walls(walls: &[[DVec2; 2]], poses: &[Pose], reach_m: f64) -> (Self, PieceSet) {
         const ON_M: f64 = 1e-3;
         let mut lines: Vec<Line> = Vec::new();
-        for [a, b] in walls {
-            let line = Line::through((*b - *a).perp().to_angle(), *a);
-            if !lines.iter().any(|known| known.is_same(&line, *a, ON_M)) {
+        let mut segments = Vec::with_capacity(walls.len());
+        for &[a, b] in walls {
+            let line = Line::through((b - a).perp().to_angle(), a);
+            let known = lines.iter().position(|known| known.is_same(&line, a, ON_M));
+            segments.push(Segment { line: known.unwrap_or(lines.len()), a, b });
+            if known.is_none() {
                 lines.push(line);
             }
         }
         let ends: Vec<(DVec2, usize)> = walls.iter().flatten().map(|end| (*end, 1)).collect();
         lines.iter_mut().for_each(|line| line.attach_points(&ends));
         let plan = Self::new(lines, poses, reach_m);
-        let mut set = PieceSet::new(plan.pieces());
-        for line in 0..plan.lines.len() {
-            for at in 0..plan.pieces_of(line) {
-                let [from, to] = [at, at + 1].map(|cut| plan.cuts[line][cut].along_m);
-                let middle = plan.lines[line].at(0.5 * (from + to));
-                let is_on = |[a, b]: &[DVec2; 2]| distance_to_segment(middle, *a, *b) < ON_M;
-                set.set(plan.piece(line, at), walls.iter().any(is_on));
-            }
-        }
+        let set = plan.of_segments(&segments);
         (plan, set)
     }
 
@@ -309,6 +304,15 @@ impl LineArrangement {
         }
         (new, set)
     }
+}
+
+/// Number of ends of a wall, by its index, that no other wall joins.
+pub(crate) fn free_ends(walls: &[Segment], at: usize) -> usize {
+    let is_joined = |end: &DVec2| {
+        let mut others = walls.iter().enumerate().filter(|(other, _)| *other != at);
+        others.any(|(_, other)| distance_to_segment(*end, other.a, other.b) < JOINED_M)
+    };
+    [walls[at].a, walls[at].b].iter().filter(|end| !is_joined(end)).count()
 }
 
 /// Positions beside groups of feet.

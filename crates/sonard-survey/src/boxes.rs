@@ -5,7 +5,7 @@ use sonard_model::geometry::{DVec2, distance_to_segment, encloses};
 
 use crate::{
     arc::Arc,
-    arrangement::{JOINED_M, LineArrangement, Segment},
+    arrangement::{LineArrangement, Segment, free_ends},
     judge::Judge,
     line::Line,
     posed::PosedPlan,
@@ -57,17 +57,11 @@ pub(crate) fn with_box(posed: &PosedPlan, judge: &Judge, left: &[&Arc]) -> Optio
 
 /// Faces with a depth of 0: short walls with a free end, the longest first, and unexplained arcs.
 fn faces(posed: &PosedPlan, walls: &[Segment], left: &[&Arc]) -> Vec<BoxShape> {
-    let is_free = |at: usize, end: DVec2| {
-        let mut others = walls.iter().enumerate().filter(|(other, _)| *other != at);
-        !others.any(|(_, other)| distance_to_segment(end, other.a, other.b) < JOINED_M)
-    };
     let length_m = |wall: &Segment| wall.a.distance(wall.b);
     let mut short: Vec<&Segment> = walls
         .iter()
         .enumerate()
-        .filter(|(at, wall)| {
-            length_m(wall) < SIDE_M[1] && (is_free(*at, wall.a) || is_free(*at, wall.b))
-        })
+        .filter(|(at, wall)| length_m(wall) < SIDE_M[1] && free_ends(walls, *at) > 0)
         .map(|(_, wall)| wall)
         .collect();
     short.sort_by(|a, b| length_m(b).total_cmp(&length_m(a)));

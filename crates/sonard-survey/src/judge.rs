@@ -8,14 +8,14 @@ use std::{
 };
 
 use sonard_model::{
-    geometry::{DVec2, Pose, distance_to_segment},
+    geometry::Pose,
     model::{Prediction, Simulator},
     reading::PingStatus,
     scene::{Material, Scene, Wall},
 };
 
 use crate::{
-    arrangement::{JOINED_M, LineArrangement, PieceSet, Segment},
+    arrangement::{LineArrangement, PieceSet, Segment, free_ends},
     readings::{Outcome, Readings},
     square::oblique_price,
     workspace::Workspace,
@@ -205,14 +205,7 @@ pub(crate) fn price(segments: &[Segment]) -> f64 {
     lines.sort_unstable();
     lines.dedup();
     let length_m: f64 = segments.iter().map(|segment| segment.a.distance(segment.b)).sum();
-    let is_free = |at: usize, end: DVec2| {
-        let mut others = segments.iter().enumerate().filter(|(other, _)| *other != at);
-        !others.any(|(_, other)| distance_to_segment(end, other.a, other.b) < JOINED_M)
-    };
-    let ends = segments.iter().enumerate();
-    let free: usize = ends
-        .map(|(at, segment)| [segment.a, segment.b].iter().filter(|end| is_free(at, **end)).count())
-        .sum();
+    let free: usize = (0..segments.len()).map(|at| free_ends(segments, at)).sum();
     LINE_NATS * lines.len() as f64
         + WALL_NATS * segments.len() as f64
         + FREE_END_NATS * free as f64

@@ -39,6 +39,9 @@ impl Default for SurveyOptions {
 }
 
 impl SurveyOptions {
+    /// Standard deviation of the directions of walls in a room that is mostly square, degrees.
+    pub const SQUARE_DEG: f64 = 1.0;
+
     /// Checks that every value is in its range.
     ///
     /// # Errors

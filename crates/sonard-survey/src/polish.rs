@@ -19,8 +19,6 @@ const MIN_GAIN: f64 = 0.05;
 /// Scatter of the threshold from firing to firing before it is estimated, and choices, decibels.
 const SIGMA_DB: f64 = 1.0;
 const SPREADS_DB: [f64; 6] = [0.35, 0.5, 0.7, 1.0, 1.5, 2.5];
-/// Standard deviation of a normal distribution, in median absolute deviations.
-const PER_MEDIAN: f64 = 1.483;
 /// Limits of the standard deviation of ranges, metres.
 const SIGMA_M: [f64; 2] = [0.0005, 0.02];
 
@@ -31,28 +29,23 @@ struct Linearized {
 }
 
 /// Improves poses and lines by the likelihood of all readings: ranges, missing echoes and the ends
-/// of arcs. Directions are tied to a square axis with a standard deviation in radians, unless it is
-/// `None`. Returns `None` if the normal equations have no solution.
-pub(crate) fn polish(posed: &mut PosedPlan, judge: &Judge, square_rad: Option<f64>) -> Option<()> {
+/// of arcs. Directions are tied to a square axis if the survey assumes one. Returns `None` if the
+/// normal equations have no solution.
+pub(crate) fn polish(posed: &mut PosedPlan, judge: &Judge) -> Option<()> {
     let rough = error_model(posed, judge)?;
-    climb(posed, judge, &rough, square_rad)?;
-    let errors = likeliest_spread(posed, judge, &error_model(posed, judge)?, square_rad)?;
-    climb(posed, judge, &errors, square_rad)
+    climb(posed, judge, &rough)?;
+    let errors = likeliest_spread(posed, judge, &error_model(posed, judge)?)?;
+    climb(posed, judge, &errors)
 }
 
 /// Maximizes the likelihood under an error model.
-fn climb(
-    posed: &mut PosedPlan,
-    judge: &Judge,
-    errors: &ErrorModel,
-    square_rad: Option<f64>,
-) -> Option<()> {
-    let mut best = linearize(posed, judge, errors, square_rad)?;
+fn climb(posed: &mut PosedPlan, judge: &Judge, errors: &ErrorModel) -> Option<()> {
+    let mut best = linearize(posed, judge, errors)?;
     let mut damping = 1e-3;
     for _ in 0..MAX_STEPS {
         let step = best.normal.step(damping)?;
         let tried = moved(posed, &step, judge);
-        let Some(at) = linearize(&tried, judge, errors, square_rad) else { break };
+        let Some(at) = linearize(&tried, judge, errors) else { break };
         let gain = at.value - best.value;
         if gain <= 0.0 {
             damping *= 30.0;
@@ -67,24 +60,20 @@ fn climb(
 }
 
 /// Error model with the scatter of the threshold that is most likely.
-fn likeliest_spread(
-    posed: &PosedPlan,
-    judge: &Judge,
-    errors: &ErrorModel,
-    square_rad: Option<f64>,
-) -> Option<ErrorModel> {
+fn likeliest_spread(posed: &PosedPlan, judge: &Judge, errors: &ErrorModel) -> Option<ErrorModel> {
     let of = |sigma_db: f64| ErrorModel { sigma_db, ..*errors };
     let scored = SPREADS_DB.iter().filter_map(|&sigma_db| {
         let errors = of(sigma_db);
-        Some((linearize(posed, judge, &errors, square_rad)?.value, errors))
+        Some((linearize(posed, judge, &errors)?.value, errors))
     });
     scored.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, errors)| errors)
 }
 
 /// Error model with the observed scatter of ranges.
 fn error_model(posed: &PosedPlan, judge: &Judge) -> Option<ErrorModel> {
-    let mut errors_m: Vec<f64> = errors_by_arc(posed, judge)?.concat();
-    errors_m.iter_mut().for_each(|error_m| *error_m = error_m.abs());
+    /// Standard deviation of a normal distribution, in median absolute deviations.
+    const PER_MEDIAN: f64 = 1.483;
+    let mut errors_m = absolute_errors_m(posed, judge)?;
     errors_m.sort_by(f64::total_cmp);
     let sigma_m = (PER_MEDIAN * quantile(&errors_m, 0.5)).clamp(SIGMA_M[0], SIGMA_M[1]);
     let reach_m = judge.workspace.reach_m();
@@ -92,8 +81,8 @@ fn error_model(posed: &PosedPlan, judge: &Judge) -> Option<ErrorModel> {
     Some(ErrorModel { outlier_share: 0.03, outlier_arc_share: 0.03, ..rough })
 }
 
-/// Measured minus predicted ranges of each explained arc, in order, metres.
-fn errors_by_arc(posed: &PosedPlan, judge: &Judge) -> Option<Vec<Vec<f64>>> {
+/// Absolute errors of the predicted ranges of all explained arcs, metres.
+fn absolute_errors_m(posed: &PosedPlan, judge: &Judge) -> Option<Vec<f64>> {
     const GATE_M: f64 = 0.03;
     let gate_m = judge.workspace.errors.gate_m(GATE_M);
     let own = judge.at_poses(&posed.poses);
@@ -101,20 +90,14 @@ fn errors_by_arc(posed: &PosedPlan, judge: &Judge) -> Option<Vec<Vec<f64>>> {
     let of_arc = |arc: &Arc| {
         let (readings, predictions) = (&own.readings()[arc.sweep], &predictions[arc.sweep]);
         let explained = explain(arc, readings, predictions, gate_m, 0.5)?;
-        let mut errors_m = explained.range_errors_m(readings, predictions);
-        errors_m.sort_by(f64::total_cmp);
-        Some(errors_m)
+        Some(explained.range_errors_m(readings, predictions))
     };
-    Some(judge.workspace.arcs.iter().flatten().filter_map(of_arc).collect())
+    let errors_m = judge.workspace.arcs.iter().flatten().filter_map(of_arc).flatten();
+    Some(errors_m.map(f64::abs).collect())
 }
 
 /// Predicts all sweeps with their derivatives.
-fn linearize(
-    posed: &PosedPlan,
-    judge: &Judge,
-    errors: &ErrorModel,
-    square_rad: Option<f64>,
-) -> Option<Linearized> {
+fn linearize(posed: &PosedPlan, judge: &Judge, errors: &ErrorModel) -> Option<Linearized> {
     let workspace = judge.workspace;
     let segments = posed.plan.segments(&posed.walls);
     let mut world = workspace.world.clone();
@@ -140,7 +123,7 @@ fn linearize(
             step.add_to(&mut normal, [from, to], [pose_column(at), pose_column(at + 1)]);
         }
     }
-    if let Some(sigma_rad) = square_rad {
+    if let Some(sigma_rad) = workspace.square_rad {
         let before = normal.loss();
         columns.add_square(&mut normal, &posed.plan, sigma_rad);
         value -= normal.loss() - before;

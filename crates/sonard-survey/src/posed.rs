@@ -65,6 +65,7 @@ impl LineColumns {
     pub(crate) fn iter(&self) -> impl Iterator<Item = usize> + '_ {
         self.lines.iter().flatten().copied()
     }
+
     /// Ties the directions of lines to their common square axis, with a standard deviation in
     /// radians.
     pub(crate) fn add_square(

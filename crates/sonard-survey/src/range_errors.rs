@@ -5,7 +5,7 @@ use sonard_model::acoustics::Sensor;
 use crate::options::SurveyOptions;
 
 /// Standard deviation of the ranges of a fine ranger in the final score, metres.
-const FINE_SIGMA_M: f64 = 0.004;
+pub(crate) const FINE_SIGMA_M: f64 = 0.004;
 /// Maximum error of a range that a fine ranger explains, metres.
 const FINE_EXPLAINED_M: f64 = 0.012;
 /// Steps of a ranger within which neighbouring ranges are one, with rounding on either side.

@@ -19,20 +19,12 @@ const PRIOR: [f64; 3] = [0.1, 0.052, 0.087];
 /// Maximum change of a step in the same order.
 const MAX_STEP: [f64; 3] = [0.02, 0.017, 0.026];
 
-/// Assumptions of a refinement.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct RefineSettings {
-    /// Maximum difference of ranges that belong together, metres.
-    pub(crate) gate_m: f64,
-    /// Standard deviation of directions from a common square axis, radians; `None` without a tie.
-    pub(crate) square_rad: Option<f64>,
-}
-
 /// Improves poses and lines together as far as the likelihood gains, and returns the covariance.
+/// Ranges that differ by more than `gate_m` do not belong together.
 pub(crate) fn refine(
     posed: &mut PosedPlan,
     judge: &Judge,
-    settings: &RefineSettings,
+    gate_m: f64,
     steps: usize,
 ) -> Option<PlanCovariance> {
     const SHARES: [f64; 3] = [1.0, 0.5, 0.2];
@@ -40,7 +32,7 @@ pub(crate) fn refine(
     for _ in 0..2 {
         let mut far = posed.clone();
         for _ in 0..steps {
-            if step(&mut far, judge, settings).is_none() {
+            if step(&mut far, judge, gate_m).is_none() {
                 break;
             }
         }
@@ -59,7 +51,7 @@ pub(crate) fn refine(
         }
     }
     let columns = LineColumns::new(posed);
-    let normal = equations(posed, &columns, judge, settings)?;
+    let normal = equations(posed, &columns, judge, gate_m)?;
     Some(PlanCovariance::new(normal.covariance()?, columns))
 }
 
@@ -83,9 +75,9 @@ fn between(from: &PosedPlan, to: &PosedPlan, share: f64, reach_m: f64) -> PosedP
 }
 
 /// Makes a step of Gauss and Newton.
-fn step(posed: &mut PosedPlan, judge: &Judge, settings: &RefineSettings) -> Option<()> {
+fn step(posed: &mut PosedPlan, judge: &Judge, gate_m: f64) -> Option<()> {
     let columns = LineColumns::new(posed);
-    let mut normal = equations(posed, &columns, judge, settings)?;
+    let mut normal = equations(posed, &columns, judge, gate_m)?;
     for pose in 1..posed.poses.len() {
         let at = pose_column(pose)?;
         normal.hold(at, PRIOR[0]);
@@ -130,7 +122,7 @@ fn equations(
     posed: &PosedPlan,
     columns: &LineColumns,
     judge: &Judge,
-    settings: &RefineSettings,
+    gate_m: f64,
 ) -> Option<NormalEquations> {
     let own = judge.at_poses(&posed.poses);
     let (simulator, predictions) = own.predictions(&posed.plan.segments(&posed.walls))?;
@@ -141,11 +133,11 @@ fn equations(
         let (readings, predictions) = (&judge.readings()[sweep], &predictions[sweep]);
         let predicted = predicted_arcs(sweep, readings, predictions, judge.workspace.errors);
         for arc in arcs {
-            let explained = explain(arc, readings, predictions, settings.gate_m, SHARE);
+            let explained = explain(arc, readings, predictions, gate_m, SHARE);
             if let Some(explained) = explained.filter(|of| of.beams.len() >= 2.min(arc.beams.len()))
             {
                 let errors = explained.range_errors_m(readings, predictions);
-                rows.add_arc(&mut normal, &explained, errors, &predicted, settings.gate_m);
+                rows.add_arc(&mut normal, &explained, errors, &predicted, gate_m);
             }
         }
     }
@@ -154,7 +146,7 @@ fn equations(
             step.add_to(&mut normal, [from, to], [pose_column(at), pose_column(at + 1)]);
         }
     }
-    if let Some(sigma_rad) = settings.square_rad {
+    if let Some(sigma_rad) = judge.workspace.square_rad {
         columns.add_square(&mut normal, &posed.plan, sigma_rad);
     }
     Some(normal)

@@ -10,8 +10,6 @@ use crate::{
     trace::unexplained,
 };
 
-/// Share of its arcs unexplained from which a sweep may be lost, with odometry and without.
-const LOST_SHARE: [f64; 2] = [0.3, 0.15];
 /// Minimum gain of another pose, nats.
 const MIN_GAIN: f64 = 10.0;
 /// Maximum share of sweeps that may be lost: the plan is that of the others.
@@ -25,7 +23,7 @@ pub(crate) fn relocated(posed: &PosedPlan, judge: &Judge) -> Option<Vec<Pose>> {
     let segments = posed.plan.segments(&posed.walls);
     let (simulator, predictions) = judge.predictions(&segments)?;
     let left = unexplained(&workspace.arcs, &workspace.readings, &predictions, explained_m);
-    let lost_share = LOST_SHARE[usize::from(workspace.moves.is_empty())];
+    let lost_share = workspace.max_unexplained_share();
     let is_lost = |sweep: &usize| {
         let of_sweep = left.iter().filter(|arc| arc.sweep == *sweep).count();
         of_sweep as f64 > lost_share * workspace.arcs[*sweep].len() as f64

@@ -6,7 +6,7 @@ use sonard_inverse::World;
 use sonard_model::{
     acoustics::{Air, Sensor},
     model::Options,
-    scene::Scene,
+    scene::{Material, Scene},
 };
 
 use crate::error::SurveyError;
@@ -30,4 +30,22 @@ pub fn unknown_room(
     let measured_m = options.max_range_m.unwrap_or(sensor.max_range_m);
     let max_range_m = Some(max_range_m.min(measured_m));
     Ok(World::new(scene, sensor, air, Options { max_range_m, ..options }))
+}
+
+/// World of an empty scene with the material of the walls, the transducer on the axis: ranges are
+/// from there.
+pub(crate) fn empty_world(world: &World, reflectance: f64) -> World {
+    let mut world = world.clone();
+    let mut scene = Scene::clone(&world.scene);
+    scene.walls.clear();
+    scene.cylinders.clear();
+    scene.robot = None;
+    scene.materials = [("wall".to_owned(), Material { reflectance, roughness: 0.0 })].into();
+    world.scene = Arc::new(scene);
+    // Rounded predictions have no derivatives; the step is part of the errors of ranges.
+    world.sensor.range_step_m = 0.0;
+    let mounting = &mut world.sensor.mounting;
+    world.delay_m -= mounting.ahead_m;
+    (mounting.ahead_m, mounting.left_m, mounting.separation_m) = (0.0, 0.0, 0.0);
+    world
 }

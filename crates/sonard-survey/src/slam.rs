@@ -95,6 +95,31 @@ pub(crate) fn virtual_map_in_order<'a>(
     map_of_poses(arcs, poses, own_moves)
 }
 
+/// Orders in which the sweeps of a course are located if its own fails: backwards; without
+/// odometry also from sweeps within it, alternately to both sides.
+pub(crate) fn orders(count: usize, is_odometry_used: bool) -> Vec<Vec<usize>> {
+    let mut found = vec![(0..count).rev().collect()];
+    if !is_odometry_used {
+        for first in [count / 2, count / 4, 3 * count / 4] {
+            let mut order: Vec<usize> = (0..count).collect();
+            order.sort_by_key(|at| (at.abs_diff(first), *at));
+            found.push(order);
+        }
+    }
+    found
+}
+
+/// Returns `true` if all poses of two courses are near each other.
+pub(crate) fn are_same_course(a: &[Pose], b: &[Pose]) -> bool {
+    const NEAR_M: f64 = 0.03;
+    const NEAR_DEG: f64 = 2.0;
+    let is_same = |(a, b): (&Pose, &Pose)| {
+        a.position().distance(b.position()) < NEAR_M
+            && wrap_180(a.heading_deg - b.heading_deg).abs() < NEAR_DEG
+    };
+    a.iter().zip(b).all(is_same)
+}
+
 /// Features of a course from rough poses, which are estimated together with them.
 pub(crate) fn map_of_poses<'a>(
     arcs: &'a [Vec<Arc>],

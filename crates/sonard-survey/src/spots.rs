@@ -18,9 +18,6 @@ const SHARE: f64 = 0.5;
 /// Minimum number of sweeps whose echoes determine a wall. From one place, the echo of a wall looks
 /// like that of an edge or of a path of higher order.
 const MIN_SWEEPS: usize = 2;
-/// Minimum share of the arcs of each sweep that a plan explains for its walls to be observed, with
-/// odometry and without, where nothing else confirms a pose.
-const MIN_EXPLAINED: [f64; 2] = [0.7, 0.85];
 /// Minimum share of all arcs that a plan explains for its walls to be observed: complete plans of
 /// simulated rooms leave 2 % at most.
 const MIN_EXPLAINED_OF_ALL: f64 = 0.92;
@@ -96,8 +93,7 @@ fn consistent_arcs<'a>(
 ) -> Option<Vec<ExplainedArc<'a>>> {
     let workspace = judge.workspace;
     let explained_m = workspace.errors.explained_m();
-    let is_lone = workspace.moves.is_empty();
-    let min_share = MIN_EXPLAINED[usize::from(is_lone)];
+    let min_share = 1.0 - workspace.max_unexplained_share();
     let mut all = Vec::new();
     for (arcs, (readings, predictions)) in
         workspace.arcs.iter().zip(judge.readings().iter().zip(predictions))

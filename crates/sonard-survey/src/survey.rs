@@ -1,12 +1,7 @@
 //! Survey as a whole.
 
-use std::sync::Arc;
-
 use sonard_inverse::{FitSweep, World};
-use sonard_model::{
-    geometry::{DVec2, Pose, wrap_180},
-    scene::{Material, Scene},
-};
+use sonard_model::geometry::{DVec2, Pose};
 
 use crate::{
     alternatives::{Assessment, assess},
@@ -23,15 +18,19 @@ use crate::{
     pose_grid::improve_poses,
     posed::PosedPlan,
     progress::{NoObserver, SurveyObserver, SurveyProgress, SurveyStage},
-    range_errors::RangeErrors,
+    range_errors::{FINE_SIGMA_M, RangeErrors},
     readings::Readings,
-    refine::{RefineSettings, refine},
+    refine::refine,
     relocate::relocated,
     report::report,
     result::{SearchEnd, Survey},
+    room::empty_world,
     scores::PlanScores,
     search::{PlanSearch, initial_walls},
-    slam::{VirtualMap, map_of_poses, reassociated, virtual_map, virtual_map_in_order},
+    slam::{
+        VirtualMap, are_same_course, map_of_poses, orders, reassociated, virtual_map,
+        virtual_map_in_order,
+    },
     square::square_lines,
     trace::unexplained,
     workspace::Workspace,
@@ -50,7 +49,7 @@ struct Round {
 const ROUNDS: [Round; 3] = [
     Round { sigma_m: 0.012, gate_m: 0.03, max_lines: 26 },
     Round { sigma_m: 0.006, gate_m: 0.012, max_lines: 30 },
-    Round { sigma_m: 0.004, gate_m: 0.012, max_lines: 30 },
+    Round { sigma_m: FINE_SIGMA_M, gate_m: 0.012, max_lines: 30 },
 ];
 /// Maximum number of restarts from the long walls.
 const MAX_RESTARTS: usize = 2;
@@ -61,9 +60,10 @@ const SHORT_M: f64 = 0.3;
 /// Maximum number of rounds.
 const MAX_ROUNDS: usize = 6;
 /// Share of all arcs unexplained from which a course may be wrong.
-const DOUBTFUL_SHARE: f64 = 0.2;
+const UNCERTAIN_SHARE: f64 = 0.2;
 /// Gain of a round below which the last one is not repeated, nats.
 const MIN_ROUND_GAIN: f64 = 0.5;
+const LAST_ROUND: &Round = &ROUNDS[ROUNDS.len() - 1];
 const REFINE_STEPS: usize = 4;
 /// Share of the budget for the search; the rest is for alternatives.
 const SEARCH_SHARE: f64 = 0.7;
@@ -71,8 +71,8 @@ const SEARCH_SHARE: f64 = 0.7;
 /// Reconstructs the walls of a room and the poses of the sweeps.
 ///
 /// The poses of the sweeps are odometry; the first is the frame. The scene of the world is ignored,
-/// and the sensor is assumed on the axis of the stepper. The result is independent of the number of
-/// threads.
+/// and the face of the sensor is assumed on the axis of the stepper or ahead of it. The result is
+/// independent of the number of threads.
 ///
 /// # Errors
 /// Fewer than two sweeps, a sweep without arcs, or an invalid sensor or option.
@@ -173,32 +173,14 @@ pub(crate) fn workspace<'a>(
     let poses: Vec<Pose> = sweeps.iter().map(|sweep| sweep.pose).collect();
     let between = |sigma| Move::between(&poses, sigma);
     let moves = options.odometry.map_or_else(Vec::new, between);
-    let mut workspace =
-        Workspace::new((world.clone(), simulator), sweeps, (readings, errors), moves, watched);
-    workspace.square_rad = options.square_deg.map(f64::to_radians);
+    let square_rad = options.square_deg.map(f64::to_radians);
+    let model = (world.clone(), simulator);
+    let workspace = Workspace::new(model, sweeps, (readings, errors), square_rad, moves, watched);
     let without = workspace.arcs.iter().zip(sweeps).find(|(arcs, _)| arcs.is_empty());
     match without {
         Some((_, sweep)) => Err(SurveyError::NoArcs(sweep.scan)),
         None => Ok(workspace),
     }
-}
-
-/// World of an empty scene with the material of the walls, the transducer on the axis: ranges are
-/// from there.
-fn empty_world(world: &World, reflectance: f64) -> World {
-    let mut world = world.clone();
-    let mut scene = Scene::clone(&world.scene);
-    scene.walls.clear();
-    scene.cylinders.clear();
-    scene.robot = None;
-    scene.materials = [("wall".to_owned(), Material { reflectance, roughness: 0.0 })].into();
-    world.scene = Arc::new(scene);
-    // Rounded predictions have no derivatives; the step is part of the errors of ranges.
-    world.sensor.range_step_m = 0.0;
-    let mounting = &mut world.sensor.mounting;
-    world.delay_m -= mounting.ahead_m;
-    (mounting.ahead_m, mounting.left_m, mounting.separation_m) = (0.0, 0.0, 0.0);
-    world
 }
 
 /// Search for poses and walls.
@@ -252,7 +234,7 @@ impl<'a> SurveySearch<'a> {
         let count = self.workspace.arcs.len();
         let tried = orders(count, self.options.odometry.is_some());
         for order in tried {
-            if self.workspace.is_over() || !self.is_doubtful() {
+            if self.workspace.is_over() || !self.is_course_uncertain() {
                 break;
             }
             let map = self.map_in_order(&order);
@@ -279,9 +261,9 @@ impl<'a> SurveySearch<'a> {
     }
 
     /// Returns `true` if more arcs are unexplained than in a plan whose poses are right.
-    fn is_doubtful(&self) -> bool {
+    fn is_course_uncertain(&self) -> bool {
         let all: usize = self.workspace.arcs.iter().map(Vec::len).sum();
-        self.left().len() as f64 > DOUBTFUL_SHARE * all as f64
+        self.left().len() as f64 > UNCERTAIN_SHARE * all as f64
     }
 
     /// Runs the rounds; where arcs remain unexplained, begins again from the long walls alone.
@@ -313,7 +295,7 @@ impl<'a> SurveySearch<'a> {
             let Some(grown) = grown.flatten() else { break };
             let before = self.state();
             self.posed = grown;
-            self.refine(&judge, self.errors().gate_m(ROUNDS[ROUNDS.len() - 1].gate_m));
+            self.refine(&judge, self.errors().gate_m(LAST_ROUND.gate_m));
             self.rounds(ROUNDS.len() - 1);
             if self.score < before.score {
                 self.restore(before);
@@ -426,9 +408,7 @@ impl<'a> SurveySearch<'a> {
     }
 
     fn refine(&mut self, judge: &Judge, gate_m: f64) {
-        let square_rad = self.options.square_deg.map(f64::to_radians);
-        let settings = RefineSettings { gate_m, square_rad };
-        self.covariance = refine(&mut self.posed, judge, &settings, REFINE_STEPS);
+        self.covariance = refine(&mut self.posed, judge, gate_m, REFINE_STEPS);
     }
 
     fn score_now(&self, sigma_m: f64) -> f64 {
@@ -487,19 +467,17 @@ impl<'a> SurveySearch<'a> {
 
     /// Judges the walls; continues with an alternative that is better.
     fn settle(&mut self) -> Assessment {
-        let last = &ROUNDS[ROUNDS.len() - 1];
         let errors = self.errors();
         for is_last in [false, false, true] {
-            let sigma_m = errors.sigma_m(last.sigma_m);
+            let sigma_m = errors.sigma_m(LAST_ROUND.sigma_m);
             let judge = Judge::new(self.workspace, &self.posed.poses, sigma_m);
-            let square_rad = self.options.square_deg.map(f64::to_radians);
-            polish(&mut self.posed, &judge, square_rad);
+            polish(&mut self.posed, &judge);
             let judge = Judge::new(self.workspace, &self.posed.poses, sigma_m);
             let mut assessment = assess(&self.posed, &judge);
             match assessment.better.take().filter(|_| !is_last) {
                 Some(better) => {
                     self.posed.walls = better.walls;
-                    self.refine(&judge, errors.gate_m(last.gate_m));
+                    self.refine(&judge, errors.gate_m(LAST_ROUND.gate_m));
                 }
                 None => return assessment,
             }
@@ -515,29 +493,4 @@ impl<'a> SurveySearch<'a> {
             walls: self.posed.plan.runs(&self.posed.walls).len(),
         });
     }
-}
-
-/// Orders in which the sweeps of a course are located if its own fails: backwards; without
-/// odometry also from sweeps within it, alternately to both sides.
-fn orders(count: usize, is_odometry_used: bool) -> Vec<Vec<usize>> {
-    let mut found = vec![(0..count).rev().collect()];
-    if !is_odometry_used {
-        for first in [count / 2, count / 4, 3 * count / 4] {
-            let mut order: Vec<usize> = (0..count).collect();
-            order.sort_by_key(|at| (at.abs_diff(first), *at));
-            found.push(order);
-        }
-    }
-    found
-}
-
-/// Returns `true` if all poses of two courses are near each other.
-fn are_same_course(a: &[Pose], b: &[Pose]) -> bool {
-    const NEAR_M: f64 = 0.03;
-    const NEAR_DEG: f64 = 2.0;
-    let is_same = |(a, b): (&Pose, &Pose)| {
-        a.position().distance(b.position()) < NEAR_M
-            && wrap_180(a.heading_deg - b.heading_deg).abs() < NEAR_DEG
-    };
-    a.iter().zip(b).all(is_same)
 }

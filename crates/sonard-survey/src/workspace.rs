@@ -40,6 +40,7 @@ impl<'a> Workspace<'a> {
         (world, simulator): (World, Simulator),
         sweeps: &'a [FitSweep],
         (readings, errors): (Vec<Readings>, RangeErrors),
+        square_rad: Option<f64>,
         moves: Vec<Move>,
         (observer, scores): (&'a dyn SurveyObserver, &'a PlanScores),
     ) -> Self {
@@ -53,7 +54,7 @@ impl<'a> Workspace<'a> {
             simulator,
             readings,
             errors,
-            square_rad: None,
+            square_rad,
             arcs,
             moves,
             observer,
@@ -71,6 +72,12 @@ impl<'a> Workspace<'a> {
     /// Wavelength of the ranger, metres.
     pub(crate) fn wavelength_m(&self) -> f64 {
         self.world.air.sound_speed_m_s() / self.world.sensor.frequency_hz
+    }
+
+    /// Share of its arcs unexplained beyond which the pose of a sweep may be wrong; less without
+    /// odometry, where nothing else confirms a pose.
+    pub(crate) fn max_unexplained_share(&self) -> f64 {
+        if self.moves.is_empty() { 0.15 } else { 0.3 }
     }
 
     /// Counts a scored scene.

@@ -119,7 +119,7 @@ fn polish_returns_to_the_true_room() {
     let (plan, walls) = plan_of(&sides(&turned), &poses);
     let mut posed = PosedPlan { plan, walls, poses: poses.clone() };
     let judge = Judge::new(&workspace, &poses, 0.004);
-    polish(&mut posed, &judge, None).expect("determined");
+    polish(&mut posed, &judge).expect("determined");
     for (pose, truth) in posed.poses.iter().zip(&truth).skip(1) {
         let off_m = pose.position().distance(truth.position());
         let off_deg = wrap_180(pose.heading_deg - truth.heading_deg);

@@ -34,8 +34,6 @@ use crate::{
 
 /// Minimum number of beams of a sweep.
 const MIN_BEAMS: usize = 8;
-/// Standard deviation of the directions of walls in a room that is mostly square.
-const SQUARE_DEG: f64 = 1.0;
 
 /// Cancellation flag of the running survey, if there is one.
 pub(in crate::server) type RunningSurvey = Arc<Mutex<Weak<AtomicBool>>>;
@@ -139,7 +137,7 @@ fn check_size(request: &SurveyRequest) -> Result<(), ApiError> {
 fn options(request: &SurveyRequest) -> SurveyOptions {
     SurveyOptions {
         odometry: (!request.no_odometry).then(|| request.odometry.unwrap_or_default()),
-        square_deg: request.square.then_some(SQUARE_DEG),
+        square_deg: request.square.then_some(SurveyOptions::SQUARE_DEG),
         reflectance: request.reflectance,
         max_scenes: request.max_scenes,
         ..SurveyOptions::default()
