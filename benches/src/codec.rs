@@ -4,26 +4,15 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use firmware_protocol::device::{Action, Board, Device, EchoReport};
-use firmware_protocol::frame::{Frame, FrameDecoder, Header, Received};
+use firmware_protocol::frame::{Frame, FrameDecoder, Received};
 use firmware_protocol::host::{Command, Host, HostConfig, HostEvent};
 use firmware_protocol::messages::{
     Blanking, Capabilities, Echoes, FirmwareVersion, Reading, ReadingStatus, Reply, Request,
     ResetCause, Settings, Sweep,
 };
+use sonard_benches::{HEADER, reading};
 
-const HEADER: Header = Header { boot: 0x1234, seq: 0x42 };
 const BEAMS: u16 = 1_000;
-
-fn reading(index: u16) -> Reading {
-    Reading {
-        sweep: 7,
-        index,
-        step: i32::from(index),
-        fired_ticks: 123_400_000 + u32::from(index),
-        status: ReadingStatus::Echo,
-        echoes: Echoes::from_ticks(&[9_652]),
-    }
-}
 
 fn codec(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("codec");

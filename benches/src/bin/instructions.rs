@@ -6,10 +6,11 @@
 use std::{hint::black_box, process::ExitCode, sync::Arc};
 
 use firmware_protocol::{
-    frame::{Frame, FrameDecoder, Header, Received},
-    messages::{Echoes, Reading, ReadingStatus, Reply},
+    frame::{Frame, FrameDecoder, Received},
+    messages::Reply,
 };
 use jiff::Timestamp;
+use sonard_benches::{HEADER, reading};
 use sonard_interpret::interpret::{Extents, InterpretSettings, Sweep, interpret};
 use sonard_inverse::{
     ErrorModel, FiringOutcome, FitSweep, Hypotheses, Parameter, SweepFiring, World,
@@ -168,19 +169,11 @@ fn convert_records() -> Result<f64, Failure> {
 
 /// Frames of 1,000 readings, encoded and decoded; the number of readings.
 fn decode_frames() -> Result<f64, Failure> {
-    let header = Header { boot: 0x1234, seq: 0x42 };
     measured_workload(|| {
         let (mut decoder, mut readings) = (FrameDecoder::new(), 0);
         for index in 0..1000_u16 {
-            let reading = Reading {
-                sweep: 7,
-                index,
-                step: i32::from(index),
-                fired_ticks: 123_400_000 + u32::from(index),
-                status: ReadingStatus::Echo,
-                echoes: Echoes::from_ticks(&[9_652]),
-            };
-            let frame = Frame::encode(header, &Reply::Reading(reading)).map_err(|_| "too long")?;
+            let frame =
+                Frame::encode(HEADER, &Reply::Reading(reading(index))).map_err(|_| "too long")?;
             for &byte in frame.iter() {
                 if let Received::Frame(raw) = decoder.push(byte) {
                     readings += u32::from(matches!(Reply::decode(raw.body), Ok(Reply::Reading(_))));
