@@ -34,7 +34,13 @@ fn hall() -> String {
 }
 
 /// A log of a day in a daemon's folder, with a scan from each pose.
-fn simulated(folder: &Path, day: u32, scene: &str, way: &str, further: &[&str]) -> PathBuf {
+pub(super) fn simulated(
+    folder: &Path,
+    day: u32,
+    scene: &str,
+    way: &str,
+    further: &[&str],
+) -> PathBuf {
     let logs = folder.join("log");
     fs::create_dir_all(&logs).expect("room on the disk");
     let log = logs.join(format!("sonard-2026010{day}T000000Z.jsonl"));

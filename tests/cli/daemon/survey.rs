@@ -3,14 +3,14 @@
 use std::{
     fs,
     io::{Read as _, Write as _},
-    path::{Path, PathBuf},
+    path::Path,
 };
 
 use serde_json::{Value, json};
 use sonard::api::{SurveyEvent, SurveyReport};
 use sonard_test_support::in_process::Daemon as InProcess;
 
-use super::{Daemon, Reply};
+use super::{Daemon, Reply, location::simulated};
 use crate::common::{run, stderr};
 
 const ROOM: &str = r#"{"name": "room", "materials": {"plaster": {"reflectance": 0.97}}, "walls": [
@@ -22,22 +22,6 @@ const FURNISHED: &str = r#"{"name": "office", "materials": {"plaster": {"reflect
     {"id": "a", "polyline": [[2, 2], [2.7, 2.2], [2.5, 3]], "closed": true, "material": "plaster"},
     {"id": "b", "polyline": [[0.8, 3.5], [1.2, 3.4], [1.3, 4], [0.9, 4.1]], "closed": true, "material": "plaster"}]}"#;
 const LONG_WAY: &str = "0.5,0.6,0\n1.3,0.8,10\n2.2,1,30\n3.3,1.2,60\n3.6,2.4,90\n3.5,3.6,120\n";
-
-/// A log in a daemon's folder, with a scan from each pose.
-fn simulated(folder: &Path, scene: &str, way: &str, further: &[&str]) -> PathBuf {
-    let logs = folder.join("log");
-    fs::create_dir_all(&logs).expect("room on the disk");
-    let log = logs.join("sonard-20260101T000000Z.jsonl");
-    let [scene_file, way_file] = ["scene.json", "trajectory.csv"].map(|name| folder.join(name));
-    fs::write(&scene_file, scene).expect("room on the disk");
-    fs::write(&way_file, format!("x_m,y_m,heading_deg\n{way}")).expect("room on the disk");
-    let [scene_file, way_file, out] =
-        [&scene_file, &way_file, &log].map(|path| path.to_str().expect("a plain path"));
-    let simulate = ["simulate", "--scene", scene_file, "--poses", way_file, "-o", out];
-    let output = run(&[&simulate[..], further].concat());
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-    log
-}
 
 /// The scans of a daemon's logs, oldest first.
 fn scans(list: &Reply) -> Vec<Value> {
@@ -63,7 +47,7 @@ fn result(reply: &Reply) -> SurveyReport {
 #[test]
 fn surveys_as_the_command_does() {
     let folder = tempfile::tempdir().expect("a folder");
-    let log = simulated(folder.path(), ROOM, STOPS, &["--max-range", "4"]);
+    let log = simulated(folder.path(), 1, ROOM, STOPS, &["--max-range", "4"]);
     let daemon = InProcess::start_mock(folder.path(), &["--set", "scanning.mode=on-request"]);
     let scans = scans(&daemon.get("/v1/scans?limit=500"));
     assert_eq!(scans.len(), 3);
@@ -106,7 +90,7 @@ fn surveys_as_the_command_does() {
 #[test]
 fn rejected_surveys() {
     let folder = tempfile::tempdir().expect("a folder");
-    simulated(folder.path(), ROOM, STOPS, &["--max-range", "4", "--step-deg", "3.6"]);
+    simulated(folder.path(), 1, ROOM, STOPS, &["--max-range", "4", "--step-deg", "3.6"]);
     let daemon = InProcess::start_mock(folder.path(), &["--set", "scanning.mode=on-request"]);
     let scans = scans(&daemon.get("/v1/scans?limit=500"));
     let absent = "00000000-0000-4000-8000-000000000000";
@@ -158,7 +142,7 @@ fn rejected_surveys() {
 #[test]
 fn one_survey_at_a_time() {
     let folder = tempfile::tempdir().expect("a folder");
-    simulated(folder.path(), FURNISHED, LONG_WAY, &[]);
+    simulated(folder.path(), 1, FURNISHED, LONG_WAY, &[]);
     let daemon = Daemon::start_mock(folder.path(), &["--set", "scanning.mode=on-request"]);
     let scans = scans(&daemon.get("/v1/scans?limit=500"));
     let request = json!({"scans": scans, "max_scenes": 100_000}).to_string();
