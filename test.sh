@@ -44,6 +44,11 @@ work=$(mktemp -d)
 trap 'end_lanes; rm -rf "$work"' EXIT
 
 fail() { printf 'test.sh: %s\n' "$*" >&2; exit 1; }
+# NAME STEP: true, and printed as a step, if NAME=0 leaves it out.
+left_out() {
+  [ "${!1:-1}" = 0 ] || return 1
+  step "$2: LEFT OUT, because $1=0"
+}
 . tests/steps.sh
 # What computes beside programs that are timed leaves them the processors.
 gently() { nice -n 10 "$@"; }
@@ -85,10 +90,7 @@ check_text() {
 }
 
 check_platforms() {
-  if [ "${PLATFORMS:-1}" = 0 ]; then
-    step "other systems: LEFT OUT, because PLATFORMS=0"
-    return
-  fi
+  if left_out PLATFORMS "other systems"; then return; fi
   step "Clippy for macOS and Windows"
   gently tests/platforms.sh
 }
@@ -114,10 +116,7 @@ fuzz() {
 }
 
 build_firmware() {
-  if [ "${FIRMWARE:-1}" = 0 ]; then
-    step "firmware and emulator: LEFT OUT, because FIRMWARE=0"
-    return
-  fi
+  if left_out FIRMWARE "firmware and emulator"; then return; fi
   step "firmware"
   firmware/test.sh build || fail "firmware: see above. Where it can't be built, FIRMWARE=0 leaves it and the emulator out"
   selection[2]+=,sonard-emulator/simavr
@@ -136,10 +135,7 @@ build_tests() {
 }
 
 prepare_browser() {
-  if [ "${PAGE:-1}" = 0 ]; then
-    step "the live page: LEFT OUT, because PAGE=0"
-    return
-  fi
+  if left_out PAGE "the live page"; then return; fi
   step "a browser for the live page"
   if ! command -v chromium >/dev/null || ! command -v chromedriver >/dev/null; then
     tests/install.sh "leave the page out with PAGE=0" chromium chromium-driver
@@ -169,10 +165,7 @@ smoke_page() {
 }
 
 smoke_playground() {
-  if [ "${PLAYGROUND:-1}" = 0 ]; then
-    step "smoke test of the playground: LEFT OUT, because PLAYGROUND=0"
-    return
-  fi
+  if left_out PLAYGROUND "smoke test of the playground"; then return; fi
   step "smoke test of the playground: types of its WebAssembly"
   if command -v rustup >/dev/null; then
     rustup --quiet target add wasm32-unknown-unknown || fail "no wasm32-unknown-unknown: PLAYGROUND=0 leaves the playground out"
@@ -188,10 +181,7 @@ develop_python() {
 
 # After the build of the tests: the package is compared with the program.
 smoke_python() {
-  if [ "${PYTHON:-1}" = 0 ]; then
-    step "smoke test of the Python package: LEFT OUT, because PYTHON=0"
-    return
-  fi
+  if left_out PYTHON "smoke test of the Python package"; then return; fi
   step "smoke test of the Python package"
   python/test.sh smoke || fail "the Python package: see above. PYTHON=0 leaves it out"
 }
@@ -202,10 +192,7 @@ check_units() {
 }
 
 count_instructions() {
-  if [ "${INSTRUCTIONS:-1}" = 0 ]; then
-    step "instruction counts: LEFT OUT, because INSTRUCTIONS=0"
-    return
-  fi
+  if left_out INSTRUCTIONS "instruction counts"; then return; fi
   step "instruction counts"
   if ! command -v valgrind >/dev/null; then tests/install.sh "leave them out with INSTRUCTIONS=0" valgrind; fi
   local built=${CARGO_TARGET_DIR:-target}/debug
@@ -245,10 +232,7 @@ check_package() {
 }
 
 check_dist() {
-  if [ "${DIST:-1}" = 0 ]; then
-    step "installation of a release: LEFT OUT, because DIST=0"
-    return
-  fi
+  if left_out DIST "installation of a release"; then return; fi
   step "installation of a release, around the tests' program"
   local wheels=()
   if [ "${PYTHON:-1}" != 0 ]; then wheels=(python/target/wheels/*.whl); fi
@@ -267,10 +251,7 @@ check_examples() {
 }
 
 check_api() {
-  if [ "${SCHEMATHESIS:-1}" = 0 ]; then
-    step "the API's document against the daemon: LEFT OUT, because SCHEMATHESIS=0"
-    return
-  fi
+  if left_out SCHEMATHESIS "the API's document against the daemon"; then return; fi
   step "the API's document against the daemon"
   tests/schemathesis.sh "${CARGO_TARGET_DIR:-target}/debug/sonard" >"$work/api" 2>&1 || {
     tail -n 100 "$work/api"
@@ -279,10 +260,7 @@ check_api() {
 }
 
 build_python() {
-  if [ "${PYTHON:-1}" = 0 ]; then
-    step "the package for Python: LEFT OUT, because PYTHON=0"
-    return
-  fi
+  if left_out PYTHON "the package for Python"; then return; fi
   step "the package for Python: wheel, lints"
   gently python/test.sh build || fail "the package for Python: see above. Where it can't be built, PYTHON=0 leaves it out"
 }
@@ -295,10 +273,7 @@ test_python() {
 
 # NAME SCRIPT WHAT FAILURE: what other programs read of sonard; NAME=0 leaves it out.
 check_peer() {
-  if [ "${!1:-1}" = 0 ]; then
-    step "$3: LEFT OUT, because $1=0"
-    return
-  fi
+  if left_out "$1" "$3"; then return; fi
   step "$3"
   "tests/peers/$2" "${CARGO_TARGET_DIR:-target}/debug/sonard" || fail "$4: $1=0 leaves it out"
 }
@@ -317,10 +292,7 @@ check_peers() {
 }
 
 check_monitoring() {
-  if [ "${PROMTOOL:-1}" = 0 ]; then
-    step "alerts as Prometheus reads them: LEFT OUT, because PROMTOOL=0"
-    return
-  fi
+  if left_out PROMTOOL "alerts as Prometheus reads them"; then return; fi
   step "alerts as Prometheus reads them"
   if ! command -v promtool >/dev/null; then tests/install.sh "leave it out with PROMTOOL=0" prometheus; fi
   tests/monitoring.sh
