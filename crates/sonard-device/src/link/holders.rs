@@ -194,22 +194,38 @@ pub(super) fn real_path(path: &Path) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
-    use std::process::{Command, Stdio};
+    use std::{
+        io::Read as _,
+        process::{Command, Stdio},
+    };
 
     use super::*;
     use crate::link::Pty;
+
+    fn wait_for_output(child: &mut std::process::Child) {
+        let output = child.stdout.as_mut().expect("is piped");
+        output.read_exact(&mut [0]).expect("the program writes a byte");
+    }
 
     #[test]
     fn holder_is_named_until_it_ends() {
         let pty = Pty::open(None).expect("a pty");
         assert_eq!(find_holders(pty.path()).found, [], "the device's own end is no holder");
         let file = fs::File::open(pty.path()).expect("opens");
-        let mut child = Command::new("sleep").arg("60").stdin(file).spawn().expect("starts");
+        // `spawn` returns before the kernel has set the new command line; the first byte of the
+        // output is written after that.
+        let mut child = Command::new("sh")
+            .args(["-c", "echo; read line"])
+            .stdin(file)
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("starts");
+        wait_for_output(&mut child);
         let holders = find_holders(pty.path());
         child.kill().expect("it runs");
         child.wait().expect("it ends");
         let described = holders.describe("none");
-        assert_eq!(described, format!("`sleep 60` (pid {})", child.id()));
+        assert_eq!(described, format!("`sh -c echo; read line` (pid {})", child.id()));
         let advice = holders.remedy(pty.path()).expect("a remedy");
         assert!(advice.contains(&format!("kill {}", child.id())), "{advice}");
         assert_eq!(find_holders(pty.path()).found, []);
@@ -219,14 +235,15 @@ mod tests {
     fn process_at_the_master_is_the_device() {
         let pty = Pty::open(None).expect("a pty");
         let path = pty.path().to_path_buf();
-        let device = "import os,sys,time; os.open(sys.argv[1], os.O_RDWR); time.sleep(60)";
+        let device = "import os,sys,time; os.open(sys.argv[1], os.O_RDWR); print(flush=True); time.sleep(60)";
         let master = rustix::io::dup(&pty).expect("a descriptor");
         let mut child = Command::new("python3")
             .args(["-c", device, path.to_str().expect("plain path")])
             .stdin(Stdio::from(master))
+            .stdout(Stdio::piped())
             .spawn()
             .expect("starts");
-        std::thread::sleep(std::time::Duration::from_millis(500));
+        wait_for_output(&mut child);
         let found = find_holders(&path).found;
         child.kill().expect("it runs");
         child.wait().expect("it ends");
