@@ -159,6 +159,13 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         moved
     }
 
+    /// Wall-clock time by the epoch that the readings of a scan refer to. The wall clock itself may
+    /// be set at any moment.
+    fn wall_time(&self) -> Timestamp {
+        let since = driver_time(self.driver.now_us());
+        self.wall_epoch.checked_add(since).unwrap_or(self.wall_epoch)
+    }
+
     /// Number of steps of the computer's wall clock. Each is an event of the scan that detected it.
     #[must_use]
     pub const fn clock_steps(&self) -> u32 {
@@ -204,7 +211,7 @@ impl<L: AsyncRead + AsyncWrite + Unpin> Ranger<L> {
         self.verify_identity().await?;
         let scan = Uuid::new_v4();
         let step = self.reanchor();
-        let time = Timestamp::now();
+        let time = self.wall_time();
         let ScanJob { pose, plan, air, request, .. } = *job;
         let start = ScanStart { air, request, ..ScanStart::new(scan, time, pose, plan) };
         sink.record(&Record::ScanStart(start))?;
@@ -346,8 +353,11 @@ struct Stopped(bool);
 
 /// Wall-clock time at the start of the driver's clock, from simultaneous readings of both.
 fn wall_epoch(wall: Timestamp, driver_us: u64) -> Timestamp {
-    let since = SignedDuration::from_micros(i64::try_from(driver_us).unwrap_or(0));
-    wall.checked_sub(since).unwrap_or(wall)
+    wall.checked_sub(driver_time(driver_us)).unwrap_or(wall)
+}
+
+fn driver_time(us: u64) -> SignedDuration {
+    SignedDuration::from_micros(i64::try_from(us).unwrap_or(0))
 }
 
 fn ignore(_event: HostEvent) -> ControlFlow<()> {
