@@ -62,25 +62,32 @@ fn run() -> Result<(), Failure> {
         Some(other) => return Err(other.unexpected().into()),
     };
     match task.as_str() {
-        "dist" => match Options::parse(arguments)? {
-            Some(options) => build(&options)?,
-            None => println!("{}", options::HELP),
-        },
-        "instructions" => match InstructionOptions::parse(arguments)? {
-            Some(options) => instructions::check(&options)?,
-            None => println!("{}", instructions::HELP),
-        },
-        "mutants" => match MutantOptions::parse(arguments)? {
-            Some(options) => mutants::test(&options)?,
-            None => println!("{}", mutants::HELP),
-        },
-        "build-cost" => match CostOptions::parse(arguments)? {
-            Some(options) => build_cost::measure(&options)?,
-            None => println!("{}", build_cost::HELP),
-        },
-        other => return Err(format!("{other}: no task; see cargo xtask --help").into()),
+        "dist" => perform(Options::parse(arguments)?, options::HELP, build),
+        "instructions" => {
+            let options = InstructionOptions::parse(arguments)?;
+            perform(options, instructions::HELP, instructions::check)
+        }
+        "mutants" => perform(MutantOptions::parse(arguments)?, mutants::HELP, mutants::test),
+        "build-cost" => {
+            perform(CostOptions::parse(arguments)?, build_cost::HELP, build_cost::measure)
+        }
+        other => Err(format!("{other}: no task; see cargo xtask --help").into()),
     }
-    Ok(())
+}
+
+/// Performs a task with its options, or prints its help.
+fn perform<T>(
+    options: Option<T>,
+    help: &str,
+    task: fn(&T) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    match options {
+        Some(options) => task(&options),
+        None => {
+            println!("{help}");
+            Ok(())
+        }
+    }
 }
 
 /// Builds the requested artefacts, and lists all files of the folder with their digests.
