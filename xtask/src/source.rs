@@ -1,6 +1,6 @@
 //! Archive of the source with all dependencies, which builds without a network.
 
-use std::{fs, io::Write as _, process::Command};
+use std::{fs, io::Write as _, path::Path, process::Command};
 
 use crate::{
     Failure,
@@ -9,7 +9,20 @@ use crate::{
     release::Release,
 };
 
-/// Packs the commit and the crates of its lock files.
+/// Selects the crates in the archive. `cargo vendor` prints its settings only if it is not quiet, and
+/// they would name a mirror that the computer uses.
+const SETTINGS: &str = "
+[source.crates-io]
+replace-with = \"vendored-sources\"
+
+[source.vendored-sources]
+directory = \"vendor\"
+";
+
+/// Manifests of the program and of the Python package, each with a lock file.
+const MANIFESTS: [&str; 2] = ["Cargo.toml", "python/Cargo.toml"];
+
+/// Packs the commit and the crates of the lock files of program and Python package.
 ///
 /// # Errors
 /// A missing crate, or a file that can't be written.
@@ -28,12 +41,26 @@ pub(crate) fn pack(release: &Release) -> Result<(), Failure> {
         "--locked",
         "--versioned-dirs",
         "--sync",
-        "python/Cargo.toml",
+        MANIFESTS[1],
+        "vendor",
     ]);
-    let settings = read(vendor.arg("vendor").current_dir(&folder))?;
+    run(vendor.current_dir(&folder))?;
     let mut configuration =
         fs::OpenOptions::new().append(true).open(folder.join(".cargo/config.toml"))?;
-    write!(configuration, "\n{settings}\n")?;
+    configuration.write_all(SETTINGS.as_bytes())?;
+    for manifest in MANIFESTS {
+        check_completeness(release, &folder.join(manifest))?;
+    }
     let archive = release.dist.join(format!("{name}.tar.gz"));
     archive::pack(&folder, release.time_s, Format::Gzip, &archive)
+}
+
+/// Resolves the dependencies of a manifest without a network and without the crates that the computer
+/// has.
+fn check_completeness(release: &Release, manifest: &Path) -> Result<(), Failure> {
+    let mut resolve = Command::new("cargo");
+    resolve.args(["metadata", "--offline", "--locked", "--format-version", "1", "--manifest-path"]);
+    resolve.arg(manifest).env("CARGO_HOME", release.work_folder("no-crates")?);
+    // Settings of the packed folder apply, not those of the checkout.
+    read(resolve.current_dir(manifest.parent().ok_or("no folder")?)).map(drop)
 }
