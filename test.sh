@@ -108,7 +108,7 @@ check_documentation() {
 fuzz() {
   if [ "$fuzz_seconds" = 0 ]; then return; fi
   step "fuzz targets, $fuzz_seconds s each"
-  FUZZ_SEED=${FUZZ_SEED:-2026} fuzz/smoke.sh "$fuzz_seconds" >"$work/fuzz" 2>&1 || {
+  FUZZ_SEED=${FUZZ_SEED:-2026} gently fuzz/smoke.sh "$fuzz_seconds" >"$work/fuzz" 2>&1 || {
     tail -n 60 "$work/fuzz"
     fail "a fuzz target found something: its input is in fuzz/artifacts"
   }
@@ -261,7 +261,7 @@ check_api() {
 
 build_python() {
   if left_out PYTHON "the package for Python"; then return; fi
-  step "the package for Python: wheel, lints"
+  step "the package for Python: wheel"
   gently python/test.sh build || fail "the package for Python: see above. Where it can't be built, PYTHON=0 leaves it out"
 }
 
@@ -387,7 +387,7 @@ default)
 all)
   check_tools
   lane "tools of others" prepare_browser get_package_tools
-  lane "apart from the workspace" build_playground fuzz build_python check_platforms
+  lane "apart from the workspace" build_playground build_python
   build_firmware
   check_text
   check_pure_part
@@ -395,7 +395,6 @@ all)
   join "tools of others"
   lane "programs of others" check_api check_peers check_monitoring play_emulator
   lane "units and package" check_units check_package count_instructions
-  check_documentation
   check_examples
   join "apart from the workspace"
   lane "release" check_dist
@@ -403,9 +402,13 @@ all)
   join "programs of others"
   join "units and package"
   join "release"
+  # Tests, and browsers even more, leave half of the processors' time to what only computes. Fuzz targets come first:
+  # the others lock the folder in which cargo looks for the tests.
+  lane "other builds" fuzz check_documentation check_platforms
   test_page
   step "tests"
   run_tests || finish $?
+  join "other builds"
   ;;
 *) fail "quick, all or no argument, not $tier" ;;
 esac

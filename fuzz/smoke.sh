@@ -12,8 +12,7 @@ triple=$(rustc -vV | sed -n 's/^host: //p')
 coverage="--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4
   -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table
   -Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1 -Cdebug-assertions -Coverflow-checks"
-# Gently, because test.sh has other things to do meanwhile.
-RUSTFLAGS=$(echo $coverage) nice -n 10 cargo build --release --target "$triple"
+RUSTFLAGS=$(echo $coverage) cargo build --release --target "$triple"
 binaries=${CARGO_TARGET_DIR:-target}/$triple/release
 
 # A slow input counts by processor time: libFuzzer's limit is wall-clock time, which a busy machine exceeds as well.

@@ -3,7 +3,7 @@
 # environment of its own under target/, made anew when what it needs has changed.
 #
 #   python/test.sh                          with the python3 on the path
-#   python/test.sh build                    the wheel and lints alone, which needs no command `sonard`
+#   python/test.sh build                    the wheel alone, which needs no command `sonard`; tests/platforms.sh has lints
 #   python/test.sh tests                    the rest, with the wheel that was built
 #   python/test.sh develop                  an unoptimised build, which needs no command `sonard`
 #   python/test.sh smoke                    the same, and the tests of the model
@@ -23,8 +23,9 @@ build_wheel() {
   rm -rf target/wheels
   target/venv/bin/maturin build --release --locked --quiet --interpreter target/venv/bin/python
   ls -lh target/wheels/*.whl | awk '{print "wheel: " $5}'
-  cargo clippy --release --locked --quiet -- -D warnings
 }
+
+lint() { cargo clippy --release --locked --quiet -- -D warnings; }
 
 # install FOLDER: the wheel into an environment.
 install_wheel() {
@@ -70,6 +71,7 @@ trap 'rm -rf "$work"' EXIT
 case ${1:-} in
 "")
   build_wheel
+  lint
   run_tests
   ;;
 build) build_wheel ;;

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
 # Clippy for the other systems, whose parts no build for Linux compiles: macOS (the program and the papers' experiments),
-# Windows (the verbs that need no device and no daemon, and the Python package). A system whose standard library can't be
-# installed is left out, and named.
+# Windows (the verbs that need no device and no daemon). A system whose standard library can't be installed is left out, and
+# named. The Python package, which has no parts of one system, is linted for Windows, or else for this one.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-target=${CARGO_TARGET_DIR:-$PWD/target}
+export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}
 
 # has_target TARGET: the target's standard library is there, or has been installed.
 has_target() {
@@ -22,6 +22,8 @@ if has_target aarch64-apple-darwin; then
 fi
 if has_target x86_64-pc-windows-gnu; then
   lint --target x86_64-pc-windows-gnu --package sonard --no-default-features --features cli
-  CARGO_TARGET_DIR=$target/python lint --target x86_64-pc-windows-gnu --manifest-path python/Cargo.toml
+  lint --target x86_64-pc-windows-gnu --manifest-path python/Cargo.toml
   printf 'Windows: the program without devices and daemon, the Python package\n'
+else
+  lint --manifest-path python/Cargo.toml
 fi
