@@ -181,9 +181,14 @@ fn deadband_of_subscribers() {
     let before = completed();
     let mut rounds = Vec::new();
     while rounds.len() < 2 && completed() < before.map(|count| count + 200) {
-        rounds.extend(subscriber.receive_for(0.5));
+        // The clock of the daemon does not pass more slowly on a busy computer: a client may miss
+        // rounds, which a line replaces.
+        let received = subscriber.receive_for(0.5).into_iter();
+        rounds.extend(received.filter(|line| line["type"] != "dropped"));
     }
-    assert!(rounds.iter().all(|scan| scan["pings"].as_array().map(Vec::len) == Some(8)));
+    for scan in &rounds {
+        assert_eq!(scan["pings"].as_array().map(Vec::len), Some(8), "{scan}");
+    }
     assert!(rounds.len() >= 2, "{}", rounds.len());
     daemon.stop();
 }
