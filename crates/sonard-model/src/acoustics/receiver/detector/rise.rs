@@ -19,6 +19,16 @@ const LONG_STEP_US: f64 = 30.0;
 /// rises by at most one step in that time.
 const LONG_QUIET_US: f64 = 200.0;
 
+/// Accuracy of threshold crossings: natural logarithm of the envelope over the threshold, or
+/// microseconds. Either is below 1e-12 m of range at usual slopes of the envelope.
+const CROSSING_LEVEL: f64 = 1e-12;
+const CROSSING_US: f64 = 1e-9;
+
+/// Maximum number of evaluations per crossing, and of those by false position; five are usual. The
+/// rest bisects [`LONG_QUIET_US`] down to [`CROSSING_US`].
+const CROSSING_ROUNDS: u32 = 52;
+const SECANT_ROUNDS: u32 = 12;
+
 impl<S: Summation> EnvelopeDetector<'_, S> {
     /// Searches the next rise for a detector that is ready from `ready_us` on, at least up to
     /// `until_us`.
@@ -216,26 +226,43 @@ impl<S: Summation> EnvelopeDetector<'_, S> {
     }
 
     /// Threshold crossing of the envelope between two times, by false position on its logarithm,
-    /// which is nearly linear.
+    /// which is nearly linear, with the end that stays damped as by Anderson and Bjorck (1973). The
+    /// result is converged: it is independent of the two times.
     fn crossing_us(&self, from: (f64, f64), to: (f64, f64)) -> f64 {
         let (mut low, mut high) = ((from.0, from.1.max(1e-9).ln()), (to.0, to.1.max(1e-9).ln()));
         let rises = high.1 >= 0.0;
-        let mut t_us = low.0;
-        for round in 0..16 {
+        let damped = |here: f64, replaced: f64| match 1.0 - here / replaced {
+            share if share > 0.0 => share,
+            _ => 0.5,
+        };
+        let mut was_high = None;
+        for round in 0..CROSSING_ROUNDS {
             // A gain step causes a jump, for which only bisection converges.
-            let share = if round < 4 { low.1 / (low.1 - high.1) } else { 0.5 };
-            t_us = low.0 + share * (high.0 - low.0);
+            let share = if round < SECANT_ROUNDS { low.1 / (low.1 - high.1) } else { 0.5 };
+            let t_us = low.0 + share * (high.0 - low.0);
             let here = self.relative_level_back(t_us).max(1e-9).ln();
-            if (here >= 0.0) == rises {
+            let is_high = (here >= 0.0) == rises;
+            if is_high {
+                if was_high == Some(true) {
+                    low.1 *= damped(here, high.1);
+                }
                 high = (t_us, here);
             } else {
+                if was_high == Some(false) {
+                    high.1 *= damped(here, low.1);
+                }
                 low = (t_us, here);
             }
-            if here.abs() < 1e-4 || high.0 - low.0 < 0.01 {
+            was_high = Some(is_high);
+            if here.abs() < CROSSING_LEVEL {
+                return t_us;
+            }
+            if high.0 - low.0 < CROSSING_US {
                 break;
             }
         }
-        t_us
+        // After a jump.
+        high.0
     }
 
     /// Envelope over threshold at most one step before the last time examined.

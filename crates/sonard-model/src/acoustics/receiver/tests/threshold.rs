@@ -1,6 +1,9 @@
 //! Thresholds that vary with gain steps and with range.
 
-use super::*;
+use super::{
+    detector::{firing::Firing, start_detector},
+    *,
+};
 
 /// The effective threshold rises with range within a step and falls at its end.
 #[test]
@@ -79,4 +82,28 @@ fn rising_threshold_attenuates() {
     }
     // Some arrivals are within a few tenths of a decibel of the threshold.
     assert!(same >= 385 && detected > 150, "{same} of 400, {detected} detected");
+}
+
+/// ECHO rises where the envelope equals the threshold, however many arrivals overlap.
+#[test]
+fn crossings_are_converged() {
+    let mut rng = Pcg64::seed_from_u64(3);
+    let (receiver, mut crossed) = (receiver(), 0);
+    for _ in 0..400 {
+        let sounds = arrivals(&random_sounds(&mut rng));
+        let mut detector = start_detector(Firing::new(&receiver, &sounds, &|_| None));
+        let ready_us = receiver.scan_start_us(0.0);
+        let Some(rise_us) = detector.next_rise(ready_us, f64::INFINITY) else { continue };
+        detector.rewind_to(ready_us);
+        let mut relative =
+            |t_us: f64| detector.level(rise_us + t_us) / detector.threshold_at(rise_us + t_us);
+        let at_rise = relative(0.0);
+        // A dip below the threshold within the integration time postpones the rise.
+        let lasts = (1..=60).all(|t_us| relative(f64::from(t_us)) > 1.0);
+        if lasts && receiver.status_at(rise_us) == PingStatus::Echo {
+            crossed += 1;
+            assert!((at_rise - 1.0).abs() < 1e-9, "{at_rise} at {rise_us}");
+        }
+    }
+    assert!(crossed > 200, "{crossed}");
 }
