@@ -31,7 +31,9 @@ pub(super) struct EnvelopeDetector<'a, S> {
     /// Active range for which step-by-step evaluation was last found necessary.
     pub(super) watched: Option<(usize, usize)>,
     /// Source of the last rise, if it was an isolated pulse.
-    pub(super) isolated: Option<IsolatedPulse>,
+    isolated: Option<IsolatedPulse>,
+    /// Start of the last rise that was searched without a limit of time.
+    onset: Option<RiseOnset>,
     /// All arrivals have the shape and phase of the transmitted pulse, the gain is constant within
     /// a pulse, and there is no noise.
     pub(super) is_plain: bool,
@@ -40,11 +42,22 @@ pub(super) struct EnvelopeDetector<'a, S> {
 
 /// Isolated arrival that crossed the threshold: no other arrival overlaps it.
 #[derive(Clone, Copy)]
-pub(super) struct IsolatedPulse {
-    pub(super) index: usize,
+struct IsolatedPulse {
+    index: usize,
     /// Threshold factor and start of the search that found the rise.
-    pub(super) factor: f64,
-    pub(super) from_us: f64,
+    factor: f64,
+    from_us: f64,
+}
+
+/// Time at which the integration of a rise began.
+#[derive(Clone, Copy)]
+struct RiseOnset {
+    /// Threshold factor and start of the search that found the rise.
+    factor: f64,
+    from_us: f64,
+    /// Latest time at which nothing was integrated, microseconds. The time above a higher threshold
+    /// is part of that above this one, so nothing is integrated then either.
+    begins_us: f64,
 }
 
 impl<'a, S: Summation> EnvelopeDetector<'a, S> {
@@ -57,6 +70,7 @@ impl<'a, S: Summation> EnvelopeDetector<'a, S> {
             timing,
             watched: None,
             isolated: None,
+            onset: None,
             summation: PhantomData,
         }
     }
@@ -65,6 +79,14 @@ impl<'a, S: Summation> EnvelopeDetector<'a, S> {
     /// rise of an isolated pulse then follows from that shape at any threshold.
     pub(super) fn has_tabulated_rises(&self) -> bool {
         self.is_plain && self.timing.follows_envelope()
+    }
+
+    /// Latest time, at least `ready_us`, at which a search may start for the same result: an earlier
+    /// search at a lower threshold integrated nothing until then.
+    fn search_start_us(&self, ready_us: f64) -> f64 {
+        let holds =
+            |onset: &RiseOnset| onset.factor <= self.threshold.factor && onset.from_us <= ready_us;
+        self.onset.filter(holds).map_or(ready_us, |onset| onset.begins_us.max(ready_us))
     }
 
     /// Envelope of some pulses at a time.
@@ -105,7 +127,18 @@ impl<S: Summation> EchoDetector for EnvelopeDetector<'_, S> {
     /// The envelope exceeds the threshold for the integration time.
     fn next_rise(&mut self, ready_us: f64, until_us: f64) -> Option<f64> {
         self.isolated = None;
-        self.search_rise(ready_us, until_us)
+        let start_us = self.search_start_us(ready_us);
+        let found = self.search_rise(start_us, until_us)?;
+        self.isolated = found.isolated.map(|index| IsolatedPulse {
+            index,
+            factor: self.threshold.factor,
+            from_us: ready_us,
+        });
+        if until_us == f64::INFINITY {
+            let (factor, begins_us) = (self.threshold.factor, found.begins_us);
+            self.onset = Some(RiseOnset { factor, from_us: ready_us, begins_us });
+        }
+        Some(found.rise_us)
     }
 
     fn delay_us(&mut self, rise_us: f64) -> f64 {

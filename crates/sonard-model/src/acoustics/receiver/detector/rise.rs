@@ -1,7 +1,7 @@
 //! Search for the time at which the envelope has exceeded the threshold for the integration time.
 
 use super::{
-    envelope::{EnvelopeDetector, IsolatedPulse},
+    envelope::EnvelopeDetector,
     firing::{EchoDetector as _, WINDOW_SLACK_US},
     pulse::ActivePulse,
     sum::Summation,
@@ -32,17 +32,20 @@ const SECANT_ROUNDS: u32 = 12;
 impl<S: Summation> EnvelopeDetector<'_, S> {
     /// Searches the next rise for a detector that is ready from `ready_us` on, at least up to
     /// `until_us`.
-    pub(super) fn search_rise(&mut self, ready_us: f64, until_us: f64) -> Option<f64> {
+    pub(super) fn search_rise(&mut self, ready_us: f64, until_us: f64) -> Option<FoundRise> {
         let receiver = self.track.firing.receiver;
         let integration_us = receiver.integration_us;
         let window_us = receiver.window_us() + WINDOW_SLACK_US;
-        let in_window = |rise_us: f64| Some(rise_us.max(ready_us)).filter(|us| *us <= window_us);
+        let in_window = |rise_us: f64, begins_us: f64, isolated: Option<usize>| {
+            let rise_us = rise_us.max(ready_us);
+            (rise_us <= window_us).then_some(FoundRise { rise_us, begins_us, isolated })
+        };
         let (mut t_us, mut here) = (ready_us, self.relative_level(ready_us));
         // A rise is found at the first sample after the integration time.
         let deadline_us = until_us + integration_us + STEP_US;
         let last_us = (window_us + 2.0 * integration_us).min(deadline_us);
-        // Time above the threshold minus time below it since then.
-        let mut charge_us = 0.0_f64;
+        // Time above the threshold minus time below it since then, and when it was last 0.
+        let (mut charge_us, mut begins_us) = (0.0_f64, ready_us);
         while t_us <= last_us && !self.track.exceeds_horizon() {
             if !here.is_above()
                 && charge_us == 0.0
@@ -52,12 +55,8 @@ impl<S: Summation> EnvelopeDetector<'_, S> {
                     Skip::Exhausted => return None,
                     Skip::Isolated { rise_us } => {
                         let is_isolated = self.has_tabulated_rises() && self.is_isolated_now();
-                        self.isolated = is_isolated.then_some(IsolatedPulse {
-                            index: self.track.active_range().0,
-                            factor: self.threshold.factor,
-                            from_us: ready_us,
-                        });
-                        return in_window(rise_us);
+                        let isolated = is_isolated.then_some(self.track.active_range().0);
+                        return in_window(rise_us, rise_us, isolated);
                     }
                     Skip::To(later_us) if later_us > t_us => {
                         (t_us, here) = (later_us, self.relative_level(later_us));
@@ -68,7 +67,7 @@ impl<S: Summation> EnvelopeDetector<'_, S> {
             }
             let missing_us = integration_us - charge_us;
             if here.is_above() && missing_us <= 0.0 {
-                return in_window(t_us - charge_us);
+                return in_window(t_us - charge_us, begins_us, None);
             }
             let step_us = if here.is_above() {
                 missing_us.clamp(1.0, LONG_STEP_US)
@@ -87,6 +86,9 @@ impl<S: Summation> EnvelopeDetector<'_, S> {
                 (charge_us + if above { part_us } else { -part_us }).max(0.0)
             };
             charge_us = charged(charge_us, crossing_us - t_us, here.is_above());
+            if charge_us == 0.0 {
+                begins_us = crossing_us;
+            }
             charge_us = charged(charge_us, next_us - crossing_us, next.is_above());
             (t_us, here) = (next_us, next);
         }
@@ -270,6 +272,15 @@ impl<S: Summation> EnvelopeDetector<'_, S> {
         // Pulses that have ended at the later time may still be active.
         self.sum(self.track.recently_active(), t_us) / self.threshold.at(t_us)
     }
+}
+
+/// Rise of the envelope, microseconds.
+pub(super) struct FoundRise {
+    pub(super) rise_us: f64,
+    /// Latest time at which nothing was integrated.
+    pub(super) begins_us: f64,
+    /// Index of the pulse, if it is isolated.
+    pub(super) isolated: Option<usize>,
 }
 
 /// Envelope relative to the threshold.

@@ -107,3 +107,31 @@ fn crossings_are_converged() {
     }
     assert!(crossed > 200, "{crossed}");
 }
+
+/// A search that continues from the rise at a lower threshold finds the same rise as one from the
+/// end of blanking.
+#[test]
+fn higher_thresholds_continue_searches() {
+    let mut rng = Pcg64::seed_from_u64(4);
+    let (receiver, mut compared) = (receiver(), 0);
+    for _ in 0..400 {
+        let sounds = arrivals(&random_sounds(&mut rng));
+        let mut bank = receiver.detector_bank(f64::INFINITY, &sounds, &|_| None);
+        let mut ready_us = 0.0;
+        for step in 0..12 {
+            let factor = 10f64.powf(0.05 * f64::from(step));
+            let continued = bank.first_rise(factor, ready_us);
+            let mut fresh = receiver.detector_bank(f64::INFINITY, &sounds, &|_| None);
+            let [a_us, b_us] = [&continued, &fresh.first_rise(factor, 0.0)]
+                .map(|rise| rise.map(|of| of.passed_us));
+            let (Some(a_us), Some(b_us)) = (a_us, b_us) else {
+                assert_eq!(a_us, b_us, "factor {factor}");
+                break;
+            };
+            assert!((a_us - b_us).abs() < 1e-6, "factor {factor}: {a_us}, {b_us}");
+            compared += 1;
+            ready_us = a_us;
+        }
+    }
+    assert!(compared > 1000, "{compared}");
+}
