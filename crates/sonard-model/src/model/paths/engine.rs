@@ -287,7 +287,9 @@ impl Arrivals for PathArrivals<'_> {
                     let rise_rad = echoes[entry.echo as usize].rise_rad;
                     ends = [0, 1].map(|end| self.engine.off_axis(ends[end], rise_rad[end]));
                 }
-                let [leaving, arriving] = ends.map(|angle| beam.one_way(angle));
+                let leaving = beam.one_way(ends[0]);
+                // Most paths return along themselves.
+                let arriving = if ends[1] == ends[0] { leaving } else { beam.one_way(ends[1]) };
                 let EchoPulse { length_m, phase_rad, gain } = self.found.pulse(entry.echo);
                 let amplitude = gain * entry.amplitude * leaving * arriving;
                 if self.engine.upper_bound(entry.amplitude, amplitude, &ends) >= floor {
