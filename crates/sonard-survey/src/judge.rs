@@ -16,7 +16,7 @@ use sonard_model::{
 
 use crate::{
     arrangement::{LineArrangement, PieceSet, Segment, free_ends},
-    readings::{Outcome, Readings},
+    readings::{Beam, Outcome, Readings},
     square::oblique_price,
     workspace::Workspace,
 };
@@ -43,14 +43,29 @@ pub(crate) struct Judge<'a> {
     pub(crate) poses: Vec<Pose>,
     /// Standard deviation of ranges, metres.
     pub(crate) sigma_m: f64,
-    known: Mutex<HashMap<PieceSet, f64>>,
+    /// Maximum log-likelihood of the readings of each sweep, nats.
+    max_nats: Vec<f64>,
+    known: Mutex<HashMap<PieceSet, KnownScore>>,
+}
+
+/// Score of walls, nats, or a bound that excluded them.
+#[derive(Debug, Clone, Copy)]
+enum KnownScore {
+    Exact(f64),
+    AtMost(f64),
 }
 
 impl<'a> Judge<'a> {
     /// Judge of the plans of one arrangement, from given poses and with a standard deviation of
     /// ranges in metres.
     pub(crate) fn new(workspace: &'a Workspace<'a>, poses: &[Pose], sigma_m: f64) -> Self {
-        Self { workspace, poses: poses.to_vec(), sigma_m, known: Mutex::default() }
+        let max_range_m = workspace.reach_m();
+        let of_beam = |beam: &Beam| outcome_nats([beam.outcome; 2], sigma_m, max_range_m);
+        let of_sweep = |readings: &Readings| {
+            readings.beams.iter().map(of_beam).sum::<f64>() / readings.beams_per_arc
+        };
+        let max_nats = workspace.readings.iter().map(of_sweep).collect();
+        Self { workspace, poses: poses.to_vec(), sigma_m, max_nats, known: Mutex::default() }
     }
 
     /// Judge from other poses.
@@ -65,21 +80,44 @@ impl<'a> Judge<'a> {
 
     /// Scores the walls of an arrangement, nats.
     pub(crate) fn score(&self, plan: &LineArrangement, walls: &PieceSet) -> f64 {
-        if let Some(known) = self.lock().get(walls) {
-            return *known;
-        }
-        let score = self.score_segments(&plan.segments(walls));
-        self.lock().insert(walls.clone(), score);
-        score
+        self.score_above(plan, walls, f64::NEG_INFINITY).unwrap_or(UNSCORED)
     }
 
-    fn lock(&self) -> std::sync::MutexGuard<'_, HashMap<PieceSet, f64>> {
+    /// Scores the walls of an arrangement, nats; `None` as soon as the readings of some sweeps
+    /// exclude a score above `floor`.
+    pub(crate) fn score_above(
+        &self,
+        plan: &LineArrangement,
+        walls: &PieceSet,
+        floor: f64,
+    ) -> Option<f64> {
+        let known = self.lock().get(walls).copied();
+        match known {
+            Some(KnownScore::Exact(score)) => return Some(score),
+            Some(KnownScore::AtMost(bound)) if bound <= floor => return None,
+            _ => {}
+        }
+        let score = self.score_segments_above(&plan.segments(walls), floor);
+        let known = score.map_or_else(KnownScore::AtMost, KnownScore::Exact);
+        self.lock().insert(walls.clone(), known);
+        score.ok()
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, HashMap<PieceSet, KnownScore>> {
         self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Scores walls, nats.
     pub(crate) fn score_segments(&self, segments: &[Segment]) -> f64 {
-        self.log_likelihood(segments) - price(segments) - self.oblique_nats(segments)
+        self.score_segments_above(segments, f64::NEG_INFINITY).unwrap_or(UNSCORED)
+    }
+
+    /// Score, or an upper bound of it that does not exceed `floor`, nats.
+    fn score_segments_above(&self, segments: &[Segment], floor: f64) -> Result<f64, f64> {
+        let (price, oblique) = (price(segments), self.oblique_nats(segments));
+        let priced = |nats: f64| nats - price - oblique;
+        let nats = self.log_likelihood_above(segments, floor + price + oblique);
+        nats.map(priced).map_err(priced)
     }
 
     /// Price of directions off right angles, nats; 0 without that assumption.
@@ -87,16 +125,29 @@ impl<'a> Judge<'a> {
         self.workspace.square_rad.map_or(0.0, |sigma_rad| oblique_price(segments, sigma_rad))
     }
 
-    /// Log-likelihood of all readings, with the readings of an arc as one, nats.
-    pub(crate) fn log_likelihood(&self, segments: &[Segment]) -> f64 {
+    /// Log-likelihood of all readings, with the readings of an arc as one, nats; an upper bound as
+    /// soon as some sweeps give one below `floor`.
+    fn log_likelihood_above(&self, segments: &[Segment], floor: f64) -> Result<f64, f64> {
+        /// Rounding of sums in different orders, nats.
+        const ROUNDING: f64 = 1e-6;
         self.workspace.count();
         let sum = || {
-            let simulator = self.simulator_of(segments)?;
-            let of_sweep = |(sweep, pose)| self.log_likelihood_of(&simulator, sweep, pose);
-            self.poses.iter().enumerate().map(of_sweep).sum::<Option<f64>>()
+            let Some(simulator) = self.simulator_of(segments) else { return Ok(UNSCORED) };
+            let mut sum = 0.0;
+            let mut max_of_rest: f64 = self.max_nats.iter().sum();
+            for (sweep, pose) in self.poses.iter().enumerate() {
+                let Some(nats) = self.log_likelihood_of(&simulator, sweep, pose) else {
+                    return Ok(UNSCORED);
+                };
+                sum += nats;
+                max_of_rest -= self.max_nats[sweep];
+                if sum + max_of_rest < floor - ROUNDING {
+                    return Err(sum + max_of_rest);
+                }
+            }
+            Ok(sum)
         };
-        let plan = plan_digest(segments, &self.poses, self.sigma_m);
-        self.workspace.scores.get_or(plan, || sum().unwrap_or(UNSCORED))
+        self.workspace.scores.get_or(plan_digest(segments, &self.poses, self.sigma_m), sum)
     }
 
     /// Log-likelihood of the readings of one sweep from a pose, nats; `None` if the scene has more
@@ -113,18 +164,9 @@ impl<'a> Judge<'a> {
 
     fn of_sweep(&self, readings: &Readings, predicted: &[Prediction]) -> f64 {
         let max_range_m = self.workspace.simulator.receiver().max_range_m;
-        let of_beam = |(measured, predicted): (Outcome, Outcome)| match (measured, predicted) {
-            (Outcome::Echo(range_m), Outcome::Echo(expected_m)) => {
-                let density = range_density(range_m - expected_m, self.sigma_m);
-                ((1.0 - OUTLIER) * density + OUTLIER / max_range_m).ln()
-            }
-            (Outcome::Echo(_), _) => (OUTLIER / max_range_m).ln(),
-            (Outcome::NoEcho, Outcome::NoEcho)
-            | (Outcome::BelowMinRange, Outcome::BelowMinRange) => (1.0 - OUTLIER).ln(),
-            _ => OUTLIER.ln(),
-        };
+        let of_beam = |outcomes| outcome_nats(outcomes, self.sigma_m, max_range_m);
         let pairs = readings.beams.iter().zip(predicted);
-        let sum: f64 = pairs.map(|(beam, of)| of_beam((beam.outcome, outcome_of(of)))).sum();
+        let sum: f64 = pairs.map(|(beam, of)| of_beam([beam.outcome, outcome_of(of)])).sum();
         sum / readings.beams_per_arc
     }
 
@@ -187,6 +229,21 @@ pub(crate) fn outcome_of(prediction: &Prediction) -> Outcome {
         (PingStatus::Echo, Some(range_m)) => Outcome::Echo(range_m),
         (PingStatus::MinRange, _) => Outcome::BelowMinRange,
         _ => Outcome::NoEcho,
+    }
+}
+
+/// Log-likelihood of a measured outcome under a predicted one, nats; largest where both are equal.
+fn outcome_nats(outcomes: [Outcome; 2], sigma_m: f64, max_range_m: f64) -> f64 {
+    match outcomes {
+        [Outcome::Echo(range_m), Outcome::Echo(expected_m)] => {
+            let density = range_density(range_m - expected_m, sigma_m);
+            ((1.0 - OUTLIER) * density + OUTLIER / max_range_m).ln()
+        }
+        [Outcome::Echo(_), _] => (OUTLIER / max_range_m).ln(),
+        [Outcome::NoEcho, Outcome::NoEcho] | [Outcome::BelowMinRange, Outcome::BelowMinRange] => {
+            (1.0 - OUTLIER).ln()
+        }
+        _ => OUTLIER.ln(),
     }
 }
 

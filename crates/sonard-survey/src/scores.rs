@@ -21,14 +21,22 @@ impl PlanScores {
         self.lock().iter().map(|(plan, nats)| (*plan, *nats)).collect()
     }
 
-    /// Returns the log-likelihood of a plan, nats, and computes it unless it is known.
-    pub(crate) fn get_or(&self, plan: u64, compute: impl FnOnce() -> f64) -> f64 {
+    /// Returns the log-likelihood of a plan, nats, and computes it unless it is known; an error is
+    /// not kept.
+    pub(crate) fn get_or<E>(
+        &self,
+        plan: u64,
+        compute: impl FnOnce() -> Result<f64, E>,
+    ) -> Result<f64, E> {
         let known = self.lock().get(&plan).copied();
-        known.unwrap_or_else(|| {
-            let nats = compute();
-            self.lock().insert(plan, nats);
-            nats
-        })
+        known.map_or_else(
+            || {
+                let nats = compute()?;
+                self.lock().insert(plan, nats);
+                Ok(nats)
+            },
+            Ok,
+        )
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, BTreeMap<u64, f64>> {

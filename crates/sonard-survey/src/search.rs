@@ -111,8 +111,10 @@ impl PlanSearch<'_> {
         let mut scored: Vec<(f64, PlanMove)> = moves
             .into_par_iter()
             .filter(allowed)
-            .map(|change| {
-                (self.judge.score(self.plan, &from.walls.changed(&change)) - from.score, change)
+            .filter_map(|change| {
+                let walls = from.walls.changed(&change);
+                let score = self.judge.score_above(self.plan, &walls, from.score + MIN_GAIN)?;
+                Some((score - from.score, change))
             })
             .collect();
         scored.retain(|(gain, _)| *gain > MIN_GAIN);
@@ -122,12 +124,14 @@ impl PlanSearch<'_> {
 
     /// Applies a move if it gains more than `min_gain`.
     fn try_move(&self, best: &mut ScoredPlan, change: &PlanMove, min_gain: f64) -> bool {
-        let changed = self.scored(best.walls.changed(change));
-        let is_better = changed.score > best.score + min_gain && changed.walls != best.walls;
-        if is_better {
-            *best = changed;
+        let walls = best.walls.changed(change);
+        let floor = best.score + min_gain;
+        let score = self.judge.score_above(self.plan, &walls, floor);
+        match score.filter(|score| *score > floor && walls != best.walls) {
+            Some(score) => *best = ScoredPlan { walls, score },
+            None => return false,
         }
-        is_better
+        true
     }
 
     /// Walls without the ends that no path of an explained arc meets.

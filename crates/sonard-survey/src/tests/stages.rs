@@ -183,6 +183,33 @@ fn truth_is_not_beaten_by_its_neighbours() {
     assert!(judge.score(&plan, &walls) < truth - 50.0);
 }
 
+/// A floor excludes exactly the plans that do not score above it, whichever floor comes first.
+#[test]
+fn floors_exclude_only_lower_scores() {
+    let (corners, poses) = (rectangle(), stops());
+    let world = world(&corners);
+    let sweeps = sweeps(&world, &poses, &poses);
+    let scores = PlanScores::default();
+    let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
+    let (plan, walls) = plan_of(&sides(&corners), &poses);
+    let exact = Judge::new(&workspace, &poses, 0.004);
+    let truth = exact.score(&plan, &walls);
+    let moves = MoveFinder::new(&plan, &poses).moves(&walls);
+    let fresh = PlanScores::default();
+    let workspace = true_workspace(&world, &sweeps, (&NoObserver, &fresh));
+    let judge = Judge::new(&workspace, &poses, 0.004);
+    let mut excluded = 0;
+    for change in moves {
+        let changed = walls.changed(&change);
+        let score = exact.score(&plan, &changed);
+        let above = judge.score_above(&plan, &changed, truth);
+        assert!(above.is_none_or(|above| above == score), "{above:?} against {score}");
+        excluded += usize::from(above.is_none());
+        assert_eq!(judge.score_above(&plan, &changed, score - 1.0), Some(score), "{change:?}");
+    }
+    assert!(excluded > 0);
+}
+
 /// From the walls at perpendiculars alone the search closes the room.
 #[test]
 fn climbing_closes_the_room() {
