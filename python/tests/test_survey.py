@@ -128,6 +128,8 @@ def test_other_threads_run(sweeps: NDArray[np.void]) -> None:
 
 INTERRUPTED = """
 import numpy as np, os, signal, sonard
+# Shells start background jobs with the signal ignored.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 room = sonard.Scene.from_points([[0, 0], [2.8, 0], [2.8, 2.3], [0, 2.3]])
 stops = np.array([[0.7, 0.6, 20.0], [1.2, 0.9, 65.0], [1.9, 1.3, 100.0]])
 sweeps = sonard.Model(room, max_range_m=4.0).predict(stops)
