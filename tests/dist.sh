@@ -239,15 +239,19 @@ check_source() {
     unshare --net cargo check --offline --locked --quiet) || fail "the source does not compile without a network"
 }
 
-# Checks that the archives contain no path or name of this computer.
+# Checks that archives, wheels and packages contain no path or name of this computer.
 look_for_traces() {
   local trace file traces=("$PWD" "$target" "${CARGO_HOME:-$HOME/.cargo}" "${RUSTUP_HOME:-$HOME/.rustup}")
   # A short name is part of other words.
   if [ "$(uname -n | wc -c)" -gt 6 ]; then traces+=("$(uname -n)"); fi
-  for file in "$dist"/*.tar.gz; do
-    case $file in *-source.tar.gz) continue ;; esac
+  for file in "$dist"/*.tar.gz "$dist"/*.whl "$dist"/*.deb; do
     mkdir -p "$work/traces"
-    tar --extract --file "$file" --directory "$work/traces"
+    case $file in
+    *-source.tar.gz | *'*'*) continue ;;
+    *.tar.gz) tar --extract --file "$file" --directory "$work/traces" ;;
+    *.whl) python3 -m zipfile --extract "$file" "$work/traces" ;;
+    *.deb) dpkg-deb --extract "$file" "$work/traces" ;;
+    esac
     for trace in "${traces[@]}"; do
       if grep -rqF -- "$trace" "$work/traces"; then fail "$(basename "$file") contains $trace"; fi
     done
