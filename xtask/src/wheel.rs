@@ -1,14 +1,14 @@
 //! Wheels with the Python package and the program, one for each processor and C library.
 
 use std::{
-    fs,
+    fs, io,
     path::{Path, PathBuf},
     process::Command,
 };
 
 use crate::{
     Failure,
-    command::run,
+    command::{read, run},
     release::Release,
     tools::{Tools, add_target},
 };
@@ -31,8 +31,46 @@ pub(crate) fn build_all(release: &Release) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Copy of the checkout at a path that is the same on every computer, removed in the end.
+///
+/// The Python package is a workspace of its own. Paths of crates outside of a workspace are part of
+/// their symbols' names, unlike those within.
+struct FixedCopy(PathBuf);
+
+impl FixedCopy {
+    fn new(release: &Release) -> Result<Self, Failure> {
+        let copy = Path::new("/tmp").join(format!("sonard-{}", release.commit));
+        fs::create_dir(&copy).map_err(|error| match error.kind() {
+            io::ErrorKind::AlreadyExists => {
+                format!(
+                    "{0} exists: another build is at work, or was killed; remove {0}",
+                    copy.display()
+                )
+            }
+            _ => format!("{}: {error}", copy.display()),
+        })?;
+        let copy = Self(copy);
+        let list = read(Command::new("git").args(["ls-files"]).current_dir(&release.root))?;
+        for name in list.lines() {
+            let (from, to) = (release.root.join(name), copy.0.join(name));
+            fs::create_dir_all(to.parent().ok_or("no folder")?)?;
+            fs::copy(&from, &to).map_err(|error| format!("{}: {error}", from.display()))?;
+        }
+        Ok(copy)
+    }
+}
+
+impl Drop for FixedCopy {
+    fn drop(&mut self) {
+        if let Err(error) = fs::remove_dir_all(&self.0) {
+            eprintln!("xtask: {}: {error}", self.0.display());
+        }
+    }
+}
+
 /// Builds the wheel of the Python package into `work`.
 fn build(release: &Release, target: &str, work: &Path) -> Result<PathBuf, Failure> {
+    let source = FixedCopy::new(release)?;
     add_target(target)?;
     let tools = Tools::for_building(&release.target)?;
     let mut build = Command::new(tools.program("maturin"));
@@ -40,7 +78,7 @@ fn build(release: &Release, target: &str, work: &Path) -> Result<PathBuf, Failur
     build.args(["--compatibility", compatibility(target)]);
     build.args(["--manifest-path", "python/Cargo.toml", "--out"]).arg(work);
     release.set_environment(&mut build)?;
-    build.env("PATH", tools.search_path());
+    build.env("PATH", tools.search_path()).current_dir(&source.0);
     run(build.env("CARGO_TARGET_DIR", release.target.join("python")))?;
     Ok(fs::read_dir(work)?.next().ok_or("no wheel was built")??.path())
 }
