@@ -1,10 +1,9 @@
 //! Archives with the program, its manual pages and completions, laid out as below `/usr/local`.
 
-use std::fs;
-
 use crate::{
     Failure,
     archive::{self, Contents, Format},
+    folders::copy,
     release::Release,
 };
 
@@ -49,19 +48,5 @@ pub(crate) fn pack_all(release: &Release) -> Result<(), Failure> {
             archive::pack(&folder, release.time_s, format, &archive)?;
         }
     }
-    Ok(())
-}
-
-/// Copies a file, or the files of a folder.
-fn copy(from: &std::path::Path, to: &std::path::Path) -> Result<(), Failure> {
-    if from.is_dir() {
-        for entry in fs::read_dir(from)? {
-            let entry = entry?;
-            copy(&entry.path(), &to.join(entry.file_name()))?;
-        }
-        return Ok(());
-    }
-    fs::create_dir_all(to.parent().ok_or("no folder")?)?;
-    fs::copy(from, to).map_err(|error| format!("{}: {error}", from.display()))?;
     Ok(())
 }

@@ -20,7 +20,7 @@ pub(crate) fn build_all(release: &Release) -> Result<(), Failure> {
         let mut package = Command::new(release.target.join("tools/bin/cargo-deb"));
         package.args(["--no-build", "--no-strip", "--quiet", "--profile", "shipped"]);
         package.args(["--variant", "dist", "--target", target, "--output"]).arg(&release.dist);
-        release.set_environment(&mut package)?;
+        release.set_environment(&mut package, &release.root)?;
         run(package.env("CARGO_TARGET_DIR", &release.target))?;
     }
     Ok(())

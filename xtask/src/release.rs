@@ -1,6 +1,11 @@
 //! Release of the checked-out commit: version, time, folders, and the environment of builds.
 
-use std::{collections::BTreeMap, env, fs, path::PathBuf, process::Command};
+use std::{
+    collections::BTreeMap,
+    env, fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
 
 use sha2::{Digest as _, Sha256};
 
@@ -73,12 +78,16 @@ impl Release {
         Ok(folder)
     }
 
-    /// Sets what makes a build independent of computer, user and time: the commit's time, and
-    /// replaced paths of checkout, target folder, registry and toolchain.
+    /// Sets what makes a build in a folder independent of computer, user and time: the commit's time,
+    /// and replaced paths of that folder, the target folder, registry and toolchain.
     ///
     /// # Errors
     /// A toolchain that does not report its folder.
-    pub(crate) fn set_environment(&self, command: &mut Command) -> Result<(), Failure> {
+    pub(crate) fn set_environment(
+        &self,
+        command: &mut Command,
+        source: &Path,
+    ) -> Result<(), Failure> {
         let home = || env::var_os("HOME").map(|home| PathBuf::from(home).join(".cargo"));
         let cargo = env::var_os("CARGO_HOME").map(PathBuf::from).or_else(home);
         let sysroot = read(Command::new("rustc").args(["--print", "sysroot"]))?;
@@ -89,7 +98,7 @@ impl Release {
             let registries = fs::read_dir(cargo.join("registry/src")).into_iter().flatten();
             folders.extend(registries.flatten().map(|entry| (entry.path(), "/crates".to_owned())));
         }
-        folders.push((self.root.clone(), "/sonard".to_owned()));
+        folders.push((source.to_owned(), "/sonard".to_owned()));
         folders.push((self.target.clone(), "/target".to_owned()));
         let flags = |option: &str| {
             let flags =
@@ -104,7 +113,7 @@ impl Release {
             .env("CARGO_INCREMENTAL", "0")
             .env("TZ", "UTC")
             .env("LC_ALL", "C")
-            .current_dir(&self.root);
+            .current_dir(source);
         Ok(())
     }
 
@@ -115,8 +124,7 @@ impl Release {
     pub(crate) fn build_program(&self, target: &str) -> Result<PathBuf, Failure> {
         let built = self.target.join(target).join("shipped/sonard");
         if let Some(program) = &self.program {
-            fs::create_dir_all(built.parent().ok_or("no folder")?)?;
-            fs::copy(program, &built)?;
+            folders::copy(program, &built)?;
             return Ok(built);
         }
         add_target(target)?;
@@ -136,7 +144,7 @@ impl Release {
             "sonard",
         ]);
         build.args(["--bin", "sonard", "--features", "full", "--target", &zig_target]);
-        self.set_environment(&mut build)?;
+        self.set_environment(&mut build, &self.root)?;
         build.env("PATH", tools.search_path()).env("CARGO_TARGET_DIR", &self.target);
         run(&mut build)?;
         Ok(built)

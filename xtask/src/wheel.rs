@@ -9,6 +9,7 @@ use std::{
 use crate::{
     Failure,
     command::{read, run},
+    folders,
     release::Release,
     tools::{Tools, add_target},
 };
@@ -19,16 +20,21 @@ use crate::{
 /// A failed build.
 pub(crate) fn build_all(release: &Release) -> Result<(), Failure> {
     let packing = Tools::for_packing(&release.target)?;
-    for target in &release.targets {
+    let wheels = match &release.wheel {
+        Some(wheel) => vec![wheel.clone()],
+        None => build_packages(release)?,
+    };
+    for (target, wheel) in release.targets.iter().zip(wheels) {
         let program = release.build_program(&target.replace("-gnu", "-musl"))?;
-        let work = release.work_folder("wheel")?;
-        let wheel = match &release.wheel {
-            Some(wheel) => wheel.clone(),
-            None => build(release, target, &work)?,
-        };
         add_program(release, &packing, &wheel, &program)?;
     }
     Ok(())
+}
+
+/// Builds the wheel of the Python package for each target, and returns their paths.
+fn build_packages(release: &Release) -> Result<Vec<PathBuf>, Failure> {
+    let source = FixedCopy::new(release)?;
+    release.targets.iter().map(|target| build(release, &source, target)).collect()
 }
 
 /// Copy of the checkout at a path that is the same on every computer, removed in the end.
@@ -52,9 +58,7 @@ impl FixedCopy {
         let copy = Self(copy);
         let list = read(Command::new("git").args(["ls-files"]).current_dir(&release.root))?;
         for name in list.lines() {
-            let (from, to) = (release.root.join(name), copy.0.join(name));
-            fs::create_dir_all(to.parent().ok_or("no folder")?)?;
-            fs::copy(&from, &to).map_err(|error| format!("{}: {error}", from.display()))?;
+            folders::copy(&release.root.join(name), &copy.0.join(name))?;
         }
         Ok(copy)
     }
@@ -68,17 +72,17 @@ impl Drop for FixedCopy {
     }
 }
 
-/// Builds the wheel of the Python package into `work`.
-fn build(release: &Release, target: &str, work: &Path) -> Result<PathBuf, Failure> {
-    let source = FixedCopy::new(release)?;
+/// Builds the wheel of the Python package for a target.
+fn build(release: &Release, source: &FixedCopy, target: &str) -> Result<PathBuf, Failure> {
+    let work = release.work_folder(&format!("wheel-{target}"))?;
     add_target(target)?;
     let tools = Tools::for_building(&release.target)?;
     let mut build = Command::new(tools.program("maturin"));
     build.args(["build", "--release", "--locked", "--quiet", "--zig", "--target", target]);
     build.args(["--compatibility", compatibility(target)]);
-    build.args(["--manifest-path", "python/Cargo.toml", "--out"]).arg(work);
-    release.set_environment(&mut build)?;
-    build.env("PATH", tools.search_path()).current_dir(&source.0);
+    build.args(["--manifest-path", "python/Cargo.toml", "--out"]).arg(&work);
+    release.set_environment(&mut build, &source.0)?;
+    build.env("PATH", tools.search_path());
     run(build.env("CARGO_TARGET_DIR", release.target.join("python")))?;
     Ok(fs::read_dir(work)?.next().ok_or("no wheel was built")??.path())
 }
@@ -96,10 +100,9 @@ fn add_program(
     let package = fs::read_dir(&folder)?.next().ok_or("an empty wheel")??;
     let data = format!("{}.data/scripts", package.file_name().to_string_lossy());
     let scripts = package.path().join(data);
-    fs::create_dir_all(&scripts)?;
-    fs::copy(program, scripts.join("sonard"))?;
+    folders::copy(program, &scripts.join("sonard"))?;
     let mut pack = Command::new(tools.program("wheel"));
-    release.set_environment(&mut pack)?;
+    release.set_environment(&mut pack, &release.root)?;
     run(pack.args(["pack", "--dest-dir"]).arg(&release.dist).arg(package.path()))
 }
 
