@@ -59,10 +59,9 @@ impl<'a> Judge<'a> {
     /// Judge of the plans of one arrangement, from given poses and with a standard deviation of
     /// ranges in metres.
     pub(crate) fn new(workspace: &'a Workspace<'a>, poses: &[Pose], sigma_m: f64) -> Self {
-        let max_range_m = workspace.reach_m();
-        let of_beam = |beam: &Beam| outcome_nats([beam.outcome; 2], sigma_m, max_range_m);
         let of_sweep = |readings: &Readings| {
-            readings.beams.iter().map(of_beam).sum::<f64>() / readings.beams_per_arc
+            let measured = readings.beams.iter().map(|beam| beam.outcome);
+            sweep_nats(readings, measured, sigma_m, workspace.reach_m())
         };
         let max_nats = workspace.readings.iter().map(of_sweep).collect();
         Self { workspace, poses: poses.to_vec(), sigma_m, max_nats, known: Mutex::default() }
@@ -159,15 +158,9 @@ impl<'a> Judge<'a> {
         pose: &Pose,
     ) -> Option<f64> {
         let readings = &self.readings()[sweep];
-        Some(self.of_sweep(readings, &predict(simulator, readings, pose)?))
-    }
-
-    fn of_sweep(&self, readings: &Readings, predicted: &[Prediction]) -> f64 {
-        let max_range_m = self.workspace.simulator.receiver().max_range_m;
-        let of_beam = |outcomes| outcome_nats(outcomes, self.sigma_m, max_range_m);
-        let pairs = readings.beams.iter().zip(predicted);
-        let sum: f64 = pairs.map(|(beam, of)| of_beam([beam.outcome, outcome_of(of)])).sum();
-        sum / readings.beams_per_arc
+        let predicted = predict(simulator, readings, pose)?;
+        let predicted = predicted.iter().map(outcome_of);
+        Some(sweep_nats(readings, predicted, self.sigma_m, self.workspace.reach_m()))
     }
 
     /// Scene with these walls, in their order.
@@ -230,6 +223,19 @@ pub(crate) fn outcome_of(prediction: &Prediction) -> Outcome {
         (PingStatus::MinRange, _) => Outcome::BelowMinRange,
         _ => Outcome::NoEcho,
     }
+}
+
+/// Log-likelihood of the readings of a sweep under predicted outcomes, nats.
+fn sweep_nats(
+    readings: &Readings,
+    predicted: impl Iterator<Item = Outcome>,
+    sigma_m: f64,
+    max_range_m: f64,
+) -> f64 {
+    let pairs = readings.beams.iter().zip(predicted);
+    let of_beam =
+        |(beam, of): (&Beam, Outcome)| outcome_nats([beam.outcome, of], sigma_m, max_range_m);
+    pairs.map(of_beam).sum::<f64>() / readings.beams_per_arc
 }
 
 /// Log-likelihood of a measured outcome under a predicted one, nats; largest where both are equal.

@@ -127,11 +127,11 @@ impl PlanSearch<'_> {
         let walls = best.walls.changed(change);
         let floor = best.score + min_gain;
         let score = self.judge.score_above(self.plan, &walls, floor);
-        match score.filter(|score| *score > floor && walls != best.walls) {
-            Some(score) => *best = ScoredPlan { walls, score },
-            None => return false,
+        let better = score.filter(|score| *score > floor && walls != best.walls);
+        if let Some(score) = better {
+            *best = ScoredPlan { walls, score };
         }
-        true
+        better.is_some()
     }
 
     /// Walls without the ends that no path of an explained arc meets.
