@@ -23,7 +23,7 @@
 #   MQTT_PEER=0          without mosquitto (Debian packages)
 #   PROMTOOL=0           without promtool (Debian package prometheus)
 #   FAKETIME=0           without the clock that is set (libfaketime)
-#   PLATFORMS=0          without Clippy for macOS and Windows
+#   PLATFORMS=0          without Clippy for macOS and Windows, and for the Python package
 #   INSTRUCTIONS=0       without instruction counts (Debian package valgrind)
 #   DIST=0               without the installation of a release that is packed around the tests' program
 #   BOOT=0               without units under a booted systemd (systemd/boot-test.sh)

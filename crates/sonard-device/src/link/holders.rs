@@ -196,13 +196,13 @@ pub(super) fn real_path(path: &Path) -> PathBuf {
 mod tests {
     use std::{
         io::Read as _,
-        process::{Command, Stdio},
+        process::{Child, Command, Stdio},
     };
 
     use super::*;
     use crate::link::Pty;
 
-    fn wait_for_output(child: &mut std::process::Child) {
+    fn wait_for_output(child: &mut Child) {
         let output = child.stdout.as_mut().expect("is piped");
         output.read_exact(&mut [0]).expect("the program writes a byte");
     }
