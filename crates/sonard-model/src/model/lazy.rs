@@ -28,7 +28,7 @@ const REACHES: [f64; 3] = [0.125, 0.25, 0.5];
 const AHEAD: f64 = 1.1;
 
 /// Share of the longest path from which on a search is complete.
-const NEARLY_ALL: f64 = 0.8;
+const NEARLY_ALL: f64 = 0.9;
 
 /// Result of a search.
 type SearchResult<'a> = Box<dyn Arrivals + 'a>;

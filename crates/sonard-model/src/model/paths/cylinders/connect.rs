@@ -131,7 +131,8 @@ impl<'a> Connector<'a> {
         let min_m = group.min_m + back.min_m;
         let floor = self.plan.settings.contact_floor(is_repeated, min_m).powi(2);
         let bound = group.max_strength.with(&back.max_strength);
-        bound * self.max_pattern_power() >= floor
+        min_m <= self.plan.settings.max_path_m
+            && bound * self.max_pattern_power() >= floor
             && bound * self.pattern_power(&group.departures, &back.departures) >= floor
     }
 
@@ -154,7 +155,8 @@ impl<'a> Connector<'a> {
             let (bound, min_power) =
                 (half_path.strength.with(&group.max_strength), floor(group.min_m));
             // In any direction: a cheap test before the one that depends on directions.
-            let may_pass = bound * self.max_pattern_power() >= min_power
+            let may_pass = half_path.min_m + group.min_m <= self.plan.settings.max_path_m
+                && bound * self.max_pattern_power() >= min_power
                 && bound * self.pattern_power(&half_path.departures, &group.departures)
                     >= min_power;
             if !may_pass {
@@ -198,7 +200,8 @@ impl<'a> Connector<'a> {
     fn may_connect(&self, out: &HalfPath, back: &HalfPath, floor: f64) -> bool {
         let [[a, b], [c, d]] = [&out.ends, &back.ends];
         let bound = out.strength.with(&back.strength);
-        a.slope + c.slope < SLACK
+        out.min_m + back.min_m <= self.plan.settings.max_path_m
+            && a.slope + c.slope < SLACK
             && b.slope + d.slope > -SLACK
             && bound * self.max_pattern_power() >= floor
             && overlap(&out.ends, &back.ends).is_some()

@@ -19,11 +19,11 @@ use super::{
     front::Front,
     half_path::{DIRECT, HalfPath},
     hits::Hits,
-    partners::Partners,
+    partners::{Partners, PartnersByLength},
     rays::{CylinderRay, CylinderRays, FIRST, SpreadRay, SurfaceLink, Surfaces, surfaces_to},
     strength::{POWER_MARGIN, Strength},
     tracer::Tracer,
-    tube::{Tube, ray_through, split},
+    tube::{Tube, advanced, min_length_m, min_spread, ray_through, split},
 };
 use crate::{
     geometry::{DVec2, distance_to_segment, wrap_pi},
@@ -32,6 +32,8 @@ use crate::{
         paths::{
             beams::{Beams, LitCylinder, UnfoldedRay},
             floor::{AngleSpan, PlanCircle, TracingPlan, TriangleSide},
+            settings::PathSettings,
+            tolerance::TIE_M,
         },
     },
 };
@@ -49,6 +51,8 @@ pub(crate) struct TubeGrower<'a> {
     views: &'a [LitCylinder],
     rays: CylinderRays,
     waiting: Vec<Tube>,
+    /// Best partners of the waiting tubes, by [`Tube::partners`].
+    partners: Vec<PartnersByLength>,
     /// All half-paths so far, those of the last level at the end.
     pub(crate) half_paths: Vec<HalfPath>,
     /// Index at which the last level begins.
@@ -69,6 +73,7 @@ impl<'a> TubeGrower<'a> {
             views: &beams.to_cylinders,
             rays: CylinderRays::default(),
             waiting: Vec::new(),
+            partners: Vec::new(),
             half_paths: Vec::new(),
             last: 0,
             // Where beams find no edge, tubes are not followed to edges.
@@ -147,6 +152,7 @@ impl<'a> TubeGrower<'a> {
                 tracer.departure(span.to_rad),
             ),
             min_m: length_m,
+            spread: one_way,
             strength: Strength::new(beam.gain, one_way, self.radius_m, &self.plan.settings),
         });
     }
@@ -154,11 +160,17 @@ impl<'a> TubeGrower<'a> {
     /// Starts tubes from the reflection at a half-path's cylinder, if they can still give an echo.
     fn launch(&mut self, index: usize, partners: &Partners) {
         let half_path = &self.half_paths[index];
-        let partner = partners.best(&half_path.departures);
+        let best = partners.best(&half_path.departures);
         let order = half_path.order + 1;
         let circle = &self.plan.cylinders.circles[half_path.cylinder as usize];
-        let floor = self.plan.settings.contact_floor(true, half_path.min_m + self.back_m(circle));
-        let may_be_detected = half_path.strength.with(&partner) >= floor.powi(2)
+        let to_next_m = self.plan.cylinders.to_next_m(half_path.cylinder);
+        // At the next cylinder; rays head-on spread least here.
+        let [length_m, width_m, growth] = half_path.spread;
+        let reflected = [length_m, width_m, growth + 2.0 * width_m / circle.radius_m];
+        let next = advanced(reflected, to_next_m);
+        let gain = half_path.gain * circle.gain;
+        let strength = Strength::new(gain, next, self.radius_m, &self.plan.settings);
+        let may_be_detected = self.may_be_detected(&strength, half_path.min_m + to_next_m, &best)
             && self.plan.settings.allows(order + 1);
         // An edge adds no order.
         if !(may_be_detected || self.has_edges && self.plan.settings.allows(order)) {
@@ -181,10 +193,12 @@ impl<'a> TubeGrower<'a> {
             mirrored: !half_path.mirrored,
             triangle: half_path.triangle,
             side: None,
-            gain: half_path.gain * circle.gain,
+            gain,
             order,
             level: half_path.level + 1,
-            partner,
+            partners: 0,
+            min_m: half_path.min_m,
+            to_next_m,
         };
         let mut surfaces = half_path.surfaces.clone();
         if half_path.link != DIRECT {
@@ -192,7 +206,8 @@ impl<'a> TubeGrower<'a> {
         }
         let view = &self.views[half_path.view as usize];
         let tracer = Tracer::new(self.plan, view, &surfaces);
-        split(&tube, &tracer, circle, 0, partners, &mut self.waiting);
+        self.partners.clear();
+        split(&tube, &tracer, circle, 0, partners, (&mut self.waiting, &mut self.partners));
     }
 
     /// Takes a tube through its triangle: splits it, records its hits and follows the parts that
@@ -251,25 +266,59 @@ impl<'a> TubeGrower<'a> {
     /// Returns `true` if an echo of the tube can still be short and strong enough.
     ///
     /// The minima of length, width and growth over its borders are those over all its rays (to
-    /// within [`POWER_MARGIN`]). With the best remaining partner they bound every echo
-    /// ([`strength`](super::strength)).
+    /// within [`POWER_MARGIN`]). They are evaluated at the side by which the tube entered, and
+    /// advanced to the nearest cylinder, where the half-path ends. With the best remaining partner
+    /// they bound every echo ([`strength`](super::strength)).
     fn is_viable(&self, tube: &Tube) -> bool {
         let settings = &self.plan.settings;
-        let left_m = tube.side.map_or(0.0, |side| {
-            let [a, b] = self.side_of(tube.triangle, side as usize);
-            distance_to_segment(self.target, a, b)
-        });
-        let length_m = tube.min_of(|front| front.length_m);
-        let min_m = length_m + left_m;
-        if min_m > settings.max_path_m {
-            return false;
+        let mut rays: SmallVec<[Front; 3]> = tube.borders.into_iter().chain(tube.middle).collect();
+        let (mut min_m, mut to_cylinder_m) = (tube.min_m, tube.to_next_m);
+        if self.has_edges {
+            let spread = min_spread(&tube.borders);
+            let left_m = tube.side.map_or(0.0, |side| {
+                let [a, b] = self.side_of(tube.triangle, side as usize);
+                distance_to_segment(self.target, a, b)
+            });
+            let echo_m = spread[0] + left_m;
+            if echo_m <= settings.max_path_m && self.is_viable_at_edge(tube.gain, spread, echo_m) {
+                return true;
+            }
         }
-        let width_m = tube.min_of(|front| front.width_m);
-        let growth = tube.min_of(|front| front.growth);
-        let spread = [length_m, width_m, growth];
-        let strength = Strength::new(tube.gain, spread, self.radius_m, &self.plan.settings);
-        strength.with(&tube.partner) >= settings.contact_floor(true, min_m).powi(2)
-            || self.has_edges && self.is_viable_at_edge(tube.gain, spread, min_m)
+        if let Some(side) = tube.side {
+            let [a, b] = self.side_of(tube.triangle, side as usize);
+            let outward = (b - a).perp();
+            for ray in &mut rays {
+                let ahead_m = outward.dot(a - ray.origin) / outward.dot(ray.along);
+                // Not for rays along the side.
+                if ahead_m > 0.0 {
+                    *ray = ray.moved(ahead_m);
+                }
+            }
+            min_m = min_m.max(min_length_m([&rays[0], &rays[1]]) - TIE_M);
+            to_cylinder_m = self.plan.cylinders.distance_to_segment(a, b);
+        }
+        let ahead = advanced(min_spread(&rays), to_cylinder_m);
+        let strength = Strength::new(tube.gain, ahead, self.radius_m, settings);
+        self.may_be_detected(&strength, min_m + to_cylinder_m, self.partners_of(tube))
+    }
+
+    pub(crate) fn partners_of(&self, tube: &Tube) -> &PartnersByLength {
+        &self.partners[tube.partners as usize]
+    }
+
+    /// Returns `true` if a half-path of this strength and of at least this length can give an echo
+    /// with any of the partners.
+    pub(crate) fn may_be_detected(
+        &self,
+        strength: &Strength,
+        min_m: f64,
+        partners: &PartnersByLength,
+    ) -> bool {
+        let PathSettings { max_path_m, unrestricted_m, .. } = self.plan.settings;
+        [unrestricted_m.min(max_path_m), max_path_m].into_iter().any(|length_m| {
+            let floor = self.plan.settings.contact_floor(true, length_m);
+            min_m <= length_m && strength.with(&partners.up_to(length_m - min_m)) >= floor.powi(2)
+        })
     }
 
     /// Returns `true` if an edge can return enough of rays with this spreading, in echoes of at

@@ -49,8 +49,10 @@ pub(crate) struct HalfPath {
     /// Contacts at the ends, by increasing angle around this cylinder.
     pub(crate) ends: [Contact; 2],
     pub(crate) departures: Departures,
-    /// Length of the shortest ray, metres.
+    /// Lower bound of the length of its rays, metres.
     pub(crate) min_m: f64,
+    /// Minima of length, width and growth where the rays arrive.
+    pub(crate) spread: [f64; 3],
     pub(crate) strength: Strength,
 }
 

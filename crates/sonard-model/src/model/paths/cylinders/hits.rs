@@ -12,13 +12,16 @@ use super::{
     half_path::HalfPath,
     strength::Strength,
     tracer::Tracer,
-    tube::{Tube, front_past, ray_past},
+    tube::{Tube, front_past, min_of_convex, min_spread, ray_past},
 };
 use crate::{
     geometry::DVec2,
     model::{
         Reflector,
-        paths::floor::{AngleSpan, PlanCircle, SurfaceArc},
+        paths::{
+            floor::{AngleSpan, PlanCircle, SurfaceArc},
+            tolerance::TIE_M,
+        },
     },
 };
 
@@ -113,22 +116,20 @@ impl TubeGrower<'_> {
         let borders = [from_rad, to_rad].map(|at| tracer.front(at));
         let middle = tracer.front(0.5 * (from_rad + to_rad));
         let hits = [&borders[0], &borders[1], &middle].map(|front| front.onto(circle));
-        let min_of =
-            |of: fn(&Front) -> f64| hits.iter().map(|hit| of(&hit.0)).fold(f64::MAX, f64::min);
-        let spread =
-            [min_of(|hit| hit.length_m), min_of(|hit| hit.width_m), min_of(|hit| hit.growth)];
+        let spread = min_spread(&hits.map(|hit| hit.0));
         let strength = Strength::new(tube.gain, spread, self.radius_m, settings);
-        let min_m = spread[0] + self.back_m(circle);
-        let is_viable = strength.with(&tube.partner) >= settings.contact_floor(true, min_m).powi(2)
-            || self.has_edges && self.is_viable_at_edge(tube.gain, spread, min_m);
-        if !is_viable || min_m > settings.max_path_m {
-            return None;
-        }
         let near = hits[2].1.to_angle();
         let mut ends = [(hits[0], from_rad), (hits[1], to_rad)]
             .map(|(hit, at)| Contact::at(hit, circle, tube.mirrored, at, near));
         if !tube.mirrored {
             ends.reverse();
+        }
+        let min_m = min_contact_length_m(&ends, circle.radius_m);
+        let whole_m = min_m + self.back_m(circle);
+        let is_viable = self.may_be_detected(&strength, min_m, self.partners_of(tube))
+            || self.has_edges && self.is_viable_at_edge(tube.gain, spread, whole_m);
+        if !is_viable || whole_m > settings.max_path_m {
+            return None;
         }
         Some(HalfPath {
             cylinder,
@@ -144,10 +145,21 @@ impl TubeGrower<'_> {
             triangle: tube.triangle,
             ends,
             departures: Departures::between(tracer.departure(from_rad), tracer.departure(to_rad)),
-            min_m: spread[0],
+            min_m,
+            spread,
             strength,
         })
     }
+}
+
+/// Lower bound of the length of all rays to a part of a cylinder's surface, from those to its ends,
+/// metres. The length is a convex function of the angle around the cylinder
+/// ([`stationary`](super::stationary)).
+fn min_contact_length_m(ends: &[Contact; 2], radius_m: f64) -> f64 {
+    let width_m = radius_m * (ends[1].angle_rad - ends[0].angle_rad);
+    let values = ends.each_ref().map(|end| end.length_m);
+    let slopes = ends.each_ref().map(|end| width_m * end.slope);
+    min_of_convex(values, slopes) - TIE_M
 }
 
 /// Computes the parts of a tube that hit an arc.

@@ -8,55 +8,119 @@ use crate::model::paths::pattern::TwoWayBound;
 /// Number of bins of the departure directions.
 const BINS: usize = 120;
 
+/// Number of steps of length, the last one that of the longest path.
+const LENGTH_STEPS: usize = 16;
+
 /// Strongest possible partners of a ray, by its direction of departure.
 #[derive(Debug, Clone)]
-pub(crate) struct Partners(Vec<Strength>);
+pub(crate) struct Partners {
+    by_bin: Vec<PartnersByLength>,
+    steps_per_m: f64,
+}
+
+/// Strongest possible partners up to a length, in steps.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PartnersByLength {
+    up_to: [Strength; LENGTH_STEPS],
+    steps_per_m: f64,
+}
+
+impl PartnersByLength {
+    fn none(steps_per_m: f64) -> Self {
+        Self { up_to: [Strength::default(); LENGTH_STEPS], steps_per_m }
+    }
+
+    /// Returns the best of all partners that are at most this long.
+    pub(crate) fn up_to(&self, length_m: f64) -> Strength {
+        if length_m < 0.0 {
+            Strength::default()
+        } else {
+            self.up_to[step(length_m, self.steps_per_m)]
+        }
+    }
+
+    fn include(&mut self, other: &Self, power: f64) {
+        for (best, other) in self.up_to.iter_mut().zip(&other.up_to) {
+            *best = best.max(other.times(power));
+        }
+    }
+}
+
+fn step(length_m: f64, steps_per_m: f64) -> usize {
+    ((length_m * steps_per_m) as usize).min(LENGTH_STEPS - 1)
+}
 
 impl Partners {
     /// Collects, for each bin, the maximum over all half-paths, weighted by the beam pattern's
     /// bound on departures that far apart. Without a bound each bin has the overall maximum.
-    pub(crate) fn from_half_paths(all: &[HalfPath], bound: Option<&TwoWayBound>) -> Self {
-        Self::from_strengths(
-            all.iter().map(|half_path| (half_path.departures, half_path.strength)),
-            bound,
-        )
+    pub(crate) fn from_half_paths(
+        all: &[HalfPath],
+        bound: Option<&TwoWayBound>,
+        max_path_m: f64,
+    ) -> Self {
+        let each =
+            |half_path: &HalfPath| (half_path.departures, half_path.strength, half_path.min_m);
+        Self::from_strengths(all.iter().map(each), bound, max_path_m)
     }
 
-    /// Collects the maxima from departures and strengths alone.
+    /// Collects the maxima from departures, strengths and lengths alone.
     fn from_strengths(
-        all: impl Iterator<Item = (Departures, Strength)>,
+        all: impl Iterator<Item = (Departures, Strength, f64)>,
         bound: Option<&TwoWayBound>,
+        max_path_m: f64,
     ) -> Self {
-        let mut own = vec![Strength::default(); BINS];
-        for (departures, strength) in all {
+        let steps_per_m = LENGTH_STEPS as f64 / max_path_m;
+        let none = PartnersByLength::none(steps_per_m);
+        let mut own = vec![none; BINS];
+        for (departures, strength, length_m) in all {
             for bin in bins(&departures) {
-                own[bin] = own[bin].max(strength);
+                let best = &mut own[bin].up_to[step(length_m.max(0.0), steps_per_m)];
+                *best = best.max(strength);
             }
         }
+        for PartnersByLength { up_to, .. } in &mut own {
+            for step in 1..LENGTH_STEPS {
+                up_to[step] = up_to[step].max(up_to[step - 1]);
+            }
+        }
+        // Most directions have none.
+        let known: Vec<(usize, PartnersByLength)> = own
+            .into_iter()
+            .enumerate()
+            .filter(|(_, own)| own.up_to[LENGTH_STEPS - 1].y > 0.0)
+            .collect();
         let Some(bound) = bound else {
-            let max_value = own.into_iter().fold(Strength::default(), Strength::max);
-            return Self(vec![max_value; BINS]);
+            let mut all = none;
+            known.iter().for_each(|(_, own)| all.include(own, 1.0));
+            return Self { by_bin: vec![all; BINS], steps_per_m };
         };
         let width_rad = TAU / BINS as f64;
         let pattern_power: Vec<f64> = (0..=BINS / 2)
             .map(|apart| bound.at((apart as f64 - 1.0).max(0.0) * width_rad).powi(2))
             .collect();
-        // Most directions have none.
-        let known: Vec<(usize, Strength)> =
-            own.into_iter().enumerate().filter(|(_, strength)| strength.y > 0.0).collect();
+        // Far apart the bound has the same value everywhere.
+        let far_power = pattern_power[BINS / 2];
+        let mut far = none;
+        known.iter().for_each(|(_, own)| far.include(own, far_power));
         let best = |bin: usize| {
-            known.iter().fold(Strength::default(), |best, &(other, strength)| {
-                let apart = bin.abs_diff(other);
-                let pattern_power = pattern_power[apart.min(BINS - apart)];
-                best.max(Strength { x: pattern_power * strength.x, y: pattern_power * strength.y })
-            })
+            let mut best = far;
+            for (other, own) in &known {
+                let apart = bin.abs_diff(*other);
+                let power = pattern_power[apart.min(BINS - apart)];
+                if power > far_power {
+                    best.include(own, power);
+                }
+            }
+            best
         };
-        Self((0..BINS).map(best).collect())
+        Self { by_bin: (0..BINS).map(best).collect(), steps_per_m }
     }
 
-    /// Returns the best partner for rays with these departures.
-    pub(crate) fn best(&self, departures: &Departures) -> Strength {
-        bins(departures).map(|bin| self.0[bin]).fold(Strength::default(), Strength::max)
+    /// Returns the best partners for rays with these departures.
+    pub(crate) fn best(&self, departures: &Departures) -> PartnersByLength {
+        let mut best = PartnersByLength::none(self.steps_per_m);
+        bins(departures).for_each(|bin| best.include(&self.by_bin[bin], 1.0));
+        best
     }
 }
 
@@ -88,9 +152,14 @@ mod tests {
         for step in 0..400 {
             let (one_rad, apart_rad) = (-PI + 0.017 * f64::from(step), 0.003 * f64::from(step));
             let other_rad = crate::geometry::wrap_pi(one_rad + apart_rad);
-            let partners =
-                Partners::from_strengths([(towards(one_rad), strength)].into_iter(), Some(&bound));
-            let [best, most] = [partners.best(&towards(other_rad)).x, bound.at(apart_rad).powi(2)];
+            let partners = Partners::from_strengths(
+                [(towards(one_rad), strength, 1.5)].into_iter(),
+                Some(&bound),
+                4.0,
+            );
+            let partners = partners.best(&towards(other_rad));
+            let [best, most] = [partners.up_to(1.5).x, bound.at(apart_rad).powi(2)];
+            assert_eq!(partners.up_to(1.0).x, 0.0);
             assert!(best >= most, "{apart_rad} apart: {best}, {most}");
         }
     }

@@ -46,6 +46,11 @@ impl Strength {
         POWER_MARGIN * (self.y * other.x + self.x * other.y)
     }
 
+    /// Strength after a further loss of power.
+    pub(crate) fn times(self, power: f64) -> Self {
+        Self { x: power * self.x, y: power * self.y }
+    }
+
     pub(crate) fn max(self, other: Self) -> Self {
         Self { x: self.x.max(other.x), y: self.y.max(other.y) }
     }

@@ -41,12 +41,13 @@ pub(crate) fn trace(
     }
     let mut outs = TubeGrower::new(plan, out, receiver);
     let mut backs = back.map(|beams| TubeGrower::new(plan, beams, transmitter));
+    let max_path_m = plan.settings.max_path_m;
     loop {
-        let partners = Partners::from_half_paths(outs.last_level(), bound);
+        let partners = Partners::from_half_paths(outs.last_level(), bound, max_path_m);
         let more = match &mut backs {
             None => outs.grow(&partners),
             Some(backs) => {
-                let others = Partners::from_half_paths(backs.last_level(), bound);
+                let others = Partners::from_half_paths(backs.last_level(), bound, max_path_m);
                 // `|` instead of `||`: both have to grow.
                 outs.grow(&others) | backs.grow(&partners)
             }

@@ -3,9 +3,8 @@
 use super::{
     departures::Departures,
     front::Front,
-    partners::Partners,
+    partners::{Partners, PartnersByLength},
     root::{End, zero_between},
-    strength::Strength,
     tracer::Tracer,
 };
 use crate::{
@@ -46,8 +45,13 @@ pub(crate) struct Tube {
     pub(crate) order: u16,
     /// Number of cylinders touched.
     pub(crate) level: u16,
-    /// Best partner that the tube's half-paths can be connected to.
-    pub(crate) partner: Strength,
+    /// Number of the best partners that the tube's half-paths can be connected to, in
+    /// [`TubeGrower`](super::grow::TubeGrower).
+    pub(crate) partners: u32,
+    /// Lower bound of the length of its rays up to its last cylinder, metres.
+    pub(crate) min_m: f64,
+    /// Lower bound of the length from there to the next cylinder, metres.
+    pub(crate) to_next_m: f64,
 }
 
 impl Tube {
@@ -68,21 +72,51 @@ impl Tube {
         };
         [part(from_rad, at_rad, [from, front]), part(at_rad, to_rad, [front, to])]
     }
-
-    /// Minimum over the borders.
-    pub(crate) fn min_of(&self, of: impl Fn(&Front) -> f64) -> f64 {
-        of(&self.borders[0]).min(of(&self.borders[1]))
-    }
 }
 
-/// Splits a tube that has just hit a circle into parts that turn little.
+/// Minima of length, width and growth over some rays.
+pub(crate) fn min_spread(rays: &[Front]) -> [f64; 3] {
+    let min = |of: fn(&Front) -> f64| rays.iter().map(of).fold(f64::INFINITY, f64::min);
+    [min(|ray| ray.length_m), min(|ray| ray.width_m), min(|ray| ray.growth)]
+}
+
+/// Length, width and growth after a further distance, metres.
+pub(crate) fn advanced([length_m, width_m, growth]: [f64; 3], distance_m: f64) -> [f64; 3] {
+    [length_m + distance_m, width_m + growth * distance_m, growth]
+}
+
+/// Lower bound of the length of all rays of a convex front to the line between the origins of two
+/// border rays, metres.
+///
+/// Along a straight line the length is a convex function of the position, with the direction of the
+/// ray as its gradient. It therefore lies above its tangents at both borders.
+pub(crate) fn min_length_m([from, to]: [&Front; 2]) -> f64 {
+    let across = to.origin - from.origin;
+    let slopes = [from.along.dot(across), to.along.dot(across)];
+    min_of_convex([from.length_m, to.length_m], slopes)
+}
+
+/// Lower bound of a convex function on an interval of length 1, from values and slopes at its ends.
+pub(crate) fn min_of_convex(values: [f64; 2], slopes: [f64; 2]) -> f64 {
+    if slopes[0] >= 0.0 {
+        return values[0];
+    }
+    if slopes[1] <= 0.0 {
+        return values[1];
+    }
+    let share = (values[1] - slopes[1] - values[0]) / (slopes[0] - slopes[1]);
+    values[0] + slopes[0] * share.clamp(0.0, 1.0)
+}
+
+/// Splits a tube that has just hit a circle into parts that turn little. Adds them to `waiting`,
+/// and the partners of each to `found`.
 pub(crate) fn split(
     tube: &Tube,
     tracer: &Tracer,
     circle: &PlanCircle,
     halvings: u32,
     partners: &Partners,
-    waiting: &mut Vec<Tube>,
+    (waiting, found): (&mut Vec<Tube>, &mut Vec<PartnersByLength>),
 ) {
     let [from, to] = tube.borders;
     let middle = |front: &Front| front.origin - circle.center;
@@ -95,11 +129,12 @@ pub(crate) fn split(
     if halvings < MAX_HALVINGS && is_wide {
         let half = 0.5 * (from_rad + to_rad);
         for part in tube.halves(half, tracer.front(half)) {
-            split(&part, tracer, circle, halvings + 1, partners, waiting);
+            split(&part, tracer, circle, halvings + 1, partners, (&mut *waiting, &mut *found));
         }
     } else {
         let departures = Departures::between(tracer.departure(from_rad), tracer.departure(to_rad));
-        waiting.push(Tube { partner: partners.best(&departures), ..*tube });
+        waiting.push(Tube { partners: found.len() as u32, ..*tube });
+        found.push(partners.best(&departures));
     }
 }
 
@@ -161,6 +196,25 @@ pub(crate) fn ray_through(tube: &Tube, tracer: &Tracer, point: DVec2) -> Option<
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Rays from a point to a line: the nearest is shorter than those at the borders.
+    #[test]
+    fn length_bound_holds_between_borders() {
+        let crossing = |at: f64| {
+            let origin = DVec2::new(at, 1.0);
+            let length_m = origin.length();
+            let (width_m, growth, departure_per_contact) = (length_m, 1.0, 1.0);
+            let along = origin / length_m;
+            Front { origin, along, length_m, width_m, growth, departure_per_contact }
+        };
+        for (from, to) in [(-0.5, 0.4), (0.2, 0.7), (-0.9, -0.1), (0.3, -0.3), (0.1, 0.1)] {
+            let bound_m = min_length_m([&crossing(from), &crossing(to)]);
+            let share = |step: i32| from + (to - from) * f64::from(step) / 100.0;
+            let min_m =
+                (0..=100).map(|step| crossing(share(step)).length_m).fold(f64::MAX, f64::min);
+            assert!(bound_m <= min_m && bound_m > min_m - 0.15, "{from} to {to}: {bound_m}");
+        }
+    }
 
     #[test]
     fn cosines_match_the_angle() {

@@ -5,7 +5,10 @@ use std::f64::consts::{PI, TAU};
 use smallvec::SmallVec;
 
 use super::mesh::Mesh;
-use crate::{geometry::DVec2, model::paths::tolerance::TIE_M};
+use crate::{
+    geometry::{DVec2, distance_to_segment},
+    model::paths::tolerance::TIE_M,
+};
 
 /// Cylinders of a scene and the triangles they reach into.
 #[derive(Debug, Default)]
@@ -13,6 +16,8 @@ pub(crate) struct Cylinders {
     pub(crate) circles: Vec<PlanCircle>,
     /// Arcs by triangle; empty without cylinders.
     by_triangle: Vec<SmallVec<[SurfaceArc; 1]>>,
+    /// Lower bound of the way from each cylinder to the next one, over walls or not, metres.
+    to_next_m: Vec<f64>,
 }
 
 /// A cylinder in the plan.
@@ -42,6 +47,10 @@ pub(crate) struct AngleSpan {
     pub(crate) to_rad: f64,
 }
 
+/// Number of cylinders from which on distances to the nearest one are not evaluated: they are
+/// small, and each evaluation would compare all cylinders.
+const MANY: usize = 5;
+
 /// Length below which spans count as empty, radians.
 const MIN_SPAN_RAD: f64 = 1e-12;
 
@@ -63,7 +72,23 @@ impl Cylinders {
                 }
             }
         }
-        Self { circles, by_triangle }
+        let to_next_m = to_next_m(&circles, mesh);
+        Self { circles, by_triangle, to_next_m }
+    }
+
+    /// Lower bound of the length that a ray runs from a cylinder to the next one, over walls or
+    /// not, metres.
+    pub(crate) fn to_next_m(&self, cylinder: u32) -> f64 {
+        self.to_next_m.get(cylinder as usize).copied().unwrap_or_default()
+    }
+
+    /// Lower bound of the distance from a segment to the nearest cylinder, metres.
+    pub(crate) fn distance_to_segment(&self, a: DVec2, b: DVec2) -> f64 {
+        if self.circles.len() >= MANY {
+            return 0.0;
+        }
+        let round = self.circles.iter().filter(|circle| circle.radius_m > 0.0);
+        round.map(|circle| circle.distance_to_segment(a, b)).fold(f64::INFINITY, f64::min)
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -79,6 +104,22 @@ impl Cylinders {
         let mut circles = self.in_triangle(triangle).iter().map(|arc| arc.cylinder as usize);
         circles.any(|at| self.circles[at].is_opaque && self.circles[at].is_crossed(from, to))
     }
+}
+
+/// Lower bound of the way from each circle to the next one: straight to another one, or to a wall
+/// and back to the same. Zeros for many circles.
+fn to_next_m(circles: &[PlanCircle], mesh: Option<&Mesh>) -> Vec<f64> {
+    let Some(mesh) = mesh.filter(|_| circles.len() < MANY) else { return Vec::new() };
+    let to_next_m = |(index, circle): (usize, &PlanCircle)| {
+        let others =
+            circles.iter().enumerate().filter(|(at, other)| *at != index && other.radius_m > 0.0);
+        let to_other_m = |(_, other): (_, &PlanCircle)| {
+            (circle.center.distance(other.center) - circle.radius_m - other.radius_m).max(0.0)
+        };
+        let by_walls = mesh.walls().map(|[a, b]| 2.0 * circle.distance_to_segment(a, b));
+        others.map(to_other_m).chain(by_walls).fold(f64::INFINITY, f64::min)
+    };
+    circles.iter().enumerate().map(to_next_m).collect()
 }
 
 /// Parts of a circle that no opaque one covers. Of two identical circles the first one counts.
@@ -114,6 +155,11 @@ impl AngleSpan {
 }
 
 impl PlanCircle {
+    /// Distance from the outside to a segment, 0 if they intersect, metres.
+    fn distance_to_segment(&self, a: DVec2, b: DVec2) -> f64 {
+        (distance_to_segment(self.center, a, b) - self.radius_m).max(0.0)
+    }
+
     /// Returns the point of the surface at an angle around the centre.
     pub(crate) fn point(&self, angle_rad: f64) -> DVec2 {
         self.center + self.radius_m * DVec2::from_angle(angle_rad)

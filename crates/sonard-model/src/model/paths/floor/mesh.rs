@@ -89,6 +89,16 @@ impl Mesh {
         self.stacked.get(&edge_key(ends)).map_or(&[], Vec::as_slice)
     }
 
+    /// Returns the ends of all sides that are walls; a side of two triangles is listed twice.
+    pub(crate) fn walls(&self) -> impl Iterator<Item = [DVec2; 2]> {
+        self.triangles.iter().flat_map(move |triangle| {
+            (0..3)
+                .filter(|side| matches!(triangle.sides[*side], TriangleSide::Wall(_)))
+                .map(|side| [side, (side + 1) % 3].map(|at| triangle.corners[at]))
+                .map(|ends| ends.map(|corner| self.points[corner as usize]))
+        })
+    }
+
     /// Returns a corner of a triangle.
     pub(crate) fn corner(&self, triangle: u32, corner: usize) -> DVec2 {
         self.points[self.triangles[triangle as usize].corners[corner] as usize]

@@ -147,6 +147,68 @@ fn body_paths_are_reciprocal() {
     }
 }
 
+/// Every echo of an exhaustive search, down to much weaker and longer echoes, that is short and
+/// strong enough is also found by a search that ends there.
+#[test]
+fn pruned_search_is_complete() {
+    let mut random = Pcg64::seed_from_u64(11);
+    let mut count = 0;
+    for case in 0..24 {
+        let mut within = |range: std::ops::Range<f64>| random.random_range(range);
+        let mut corner =
+            |x: f64, y: f64| DVec2::new(x + within(-0.15..0.15), y + within(-0.15..0.15));
+        let corners = [corner(0.0, 0.0), corner(1.1, 0.0), corner(1.1, 0.9), corner(0.0, 0.9)];
+        let mut room = polygon(&corners);
+        let center = DVec2::new(within(0.35..0.75), within(0.35..0.55));
+        let radius_m = within(0.08..0.19);
+        room.cylinders = vec![body(center, radius_m)];
+        if case % 3 == 0 {
+            room.cylinders.push(body(center + DVec2::new(0.26, 0.0), 0.05));
+        }
+        let out = DVec2::from_angle(within(0.0..TAU));
+        let at = center + (radius_m + within(0.01..0.12)) * out;
+        let is_hidden =
+            room.cylinders.iter().any(|body| body.center.distance(at) < body.radius_m + 1e-3);
+        if is_hidden {
+            continue;
+        }
+        let settings = PathSettings {
+            max_path_m: within(1.5..3.0),
+            floor: within(2e-3..6e-3),
+            unrestricted_m: within(0.3..1.0),
+            absorption_np_per_m: 0.19,
+            ..LOSSLESS
+        };
+        let all = PathSettings {
+            max_path_m: settings.max_path_m + 1.0,
+            floor: 0.2 * settings.floor,
+            repeated_contact_ratio: 3.0,
+            ..settings.clone()
+        };
+        let is_listed = |echo: &EchoPath| {
+            let contacts = |surface: &&Reflector| matches!(surface, Reflector::Cylinder(_));
+            let is_repeated = reflectors(&echo.path).iter().filter(contacts).count() > 1;
+            echo.length_m <= settings.max_path_m
+                && echo.amplitude >= settings.contact_floor(is_repeated, echo.length_m)
+        };
+        let found = Paths::new(&room, settings.clone()).enumerate(at).expect("few paths");
+        let all = Paths::new(&room, all).enumerate(at).expect("few paths");
+        let lengths_m = |echoes: &[EchoPath]| -> Vec<f64> {
+            echoes.iter().filter(|echo| is_listed(echo)).map(|echo| echo.length_m).collect()
+        };
+        let [found_m, all_m] = [lengths_m(&found), lengths_m(&all)];
+        assert_eq!(
+            found_m.len(),
+            all_m.len(),
+            "case {case}: {corners:?}, {center} {radius_m}, {at}"
+        );
+        let are_same = found_m.iter().zip(&all_m).all(|(one, other)| (one - other).abs() < 1e-9);
+        assert!(are_same, "case {case}");
+        count += found_m.len();
+    }
+    assert!(count > 3000, "{count}");
+}
+
 /// The number of contacts is limited by detectability, not by a constant.
 #[test]
 fn contacts_end_with_detectability() {
