@@ -271,7 +271,6 @@ impl<'a> TubeGrower<'a> {
     /// they bound every echo ([`strength`](super::strength)).
     fn is_viable(&self, tube: &Tube) -> bool {
         let settings = &self.plan.settings;
-        let mut rays: SmallVec<[Front; 3]> = tube.borders.into_iter().chain(tube.middle).collect();
         let (mut min_m, mut to_cylinder_m) = (tube.min_m, tube.to_next_m);
         if self.has_edges {
             let spread = min_spread(&tube.borders);
@@ -284,6 +283,8 @@ impl<'a> TubeGrower<'a> {
                 return true;
             }
         }
+        let [from, to] = tube.borders;
+        let mut rays = [from, to, tube.middle.unwrap_or(from)];
         if let Some(side) = tube.side {
             let [a, b] = self.side_of(tube.triangle, side as usize);
             let outward = (b - a).perp();

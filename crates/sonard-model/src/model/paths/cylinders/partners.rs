@@ -1,6 +1,9 @@
 //! Candidate partners that a half-path can be connected to.
 
-use std::f64::consts::{PI, TAU};
+use std::{
+    cell::OnceCell,
+    f64::consts::{PI, TAU},
+};
 
 use super::{departures::Departures, half_path::HalfPath, strength::Strength};
 use crate::model::paths::pattern::TwoWayBound;
@@ -9,13 +12,19 @@ use crate::model::paths::pattern::TwoWayBound;
 const BINS: usize = 120;
 
 /// Number of steps of length, the last one that of the longest path.
-const LENGTH_STEPS: usize = 16;
+const LENGTH_STEPS: usize = 8;
 
 /// Strongest possible partners of a ray, by its direction of departure.
 #[derive(Debug, Clone)]
 pub(crate) struct Partners {
-    by_bin: Vec<PartnersByLength>,
-    steps_per_m: f64,
+    /// Of each bin that has any, unweighted.
+    own: Vec<(usize, PartnersByLength)>,
+    /// Bound of the pattern's power by the number of bins apart.
+    pattern_power: Vec<f64>,
+    /// Best partners of all bins, with the pattern's bound for directions far apart.
+    far: PartnersByLength,
+    /// Best partners by bin, weighted; computed for the bins that half-paths depart in.
+    by_bin: Vec<OnceCell<PartnersByLength>>,
 }
 
 /// Strongest possible partners up to a length, in steps.
@@ -89,37 +98,36 @@ impl Partners {
             .enumerate()
             .filter(|(_, own)| own.up_to[LENGTH_STEPS - 1].y > 0.0)
             .collect();
-        let Some(bound) = bound else {
-            let mut all = none;
-            known.iter().for_each(|(_, own)| all.include(own, 1.0));
-            return Self { by_bin: vec![all; BINS], steps_per_m };
-        };
         let width_rad = TAU / BINS as f64;
-        let pattern_power: Vec<f64> = (0..=BINS / 2)
-            .map(|apart| bound.at((apart as f64 - 1.0).max(0.0) * width_rad).powi(2))
-            .collect();
-        // Far apart the bound has the same value everywhere.
-        let far_power = pattern_power[BINS / 2];
+        let power = |apart: usize| {
+            let apart_rad = (apart as f64 - 1.0).max(0.0) * width_rad;
+            bound.map_or(1.0, |bound| bound.at(apart_rad).powi(2))
+        };
+        let pattern_power: Vec<f64> = (0..=BINS / 2).map(power).collect();
         let mut far = none;
-        known.iter().for_each(|(_, own)| far.include(own, far_power));
-        let best = |bin: usize| {
-            let mut best = far;
-            for (other, own) in &known {
+        known.iter().for_each(|(_, own)| far.include(own, pattern_power[BINS / 2]));
+        Self { own: known, pattern_power, far, by_bin: vec![OnceCell::new(); BINS] }
+    }
+
+    fn of_bin(&self, bin: usize) -> &PartnersByLength {
+        self.by_bin[bin].get_or_init(|| {
+            let mut best = self.far;
+            for (other, own) in &self.own {
                 let apart = bin.abs_diff(*other);
-                let power = pattern_power[apart.min(BINS - apart)];
-                if power > far_power {
+                let power = self.pattern_power[apart.min(BINS - apart)];
+                // Far apart the bound has the same value everywhere.
+                if power > self.pattern_power[BINS / 2] {
                     best.include(own, power);
                 }
             }
             best
-        };
-        Self { by_bin: (0..BINS).map(best).collect(), steps_per_m }
+        })
     }
 
     /// Returns the best partners for rays with these departures.
     pub(crate) fn best(&self, departures: &Departures) -> PartnersByLength {
-        let mut best = PartnersByLength::none(self.steps_per_m);
-        bins(departures).for_each(|bin| best.include(&self.by_bin[bin], 1.0));
+        let mut best = PartnersByLength::none(self.far.steps_per_m);
+        bins(departures).for_each(|bin| best.include(self.of_bin(bin), 1.0));
         best
     }
 }
