@@ -11,13 +11,13 @@ use crate::model::paths::pattern::TwoWayBound;
 /// Number of bins of the departure directions.
 const BINS: usize = 120;
 
-/// Number of steps of length, the last one that of the longest path.
+/// Number of steps of length up to the longest path.
 const LENGTH_STEPS: usize = 8;
 
 /// Strongest possible partners of a ray, by its direction of departure.
 #[derive(Debug, Clone)]
 pub(crate) struct Partners {
-    /// Of each bin that has any, unweighted.
+    /// Strongest half-paths of each bin that has any, unweighted.
     own: Vec<(usize, PartnersByLength)>,
     /// Bound of the pattern's power by the number of bins apart.
     pattern_power: Vec<f64>,
