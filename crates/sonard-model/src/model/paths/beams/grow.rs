@@ -307,8 +307,7 @@ impl<'a> Grower<'a> {
     /// Returns `true` if a beam can be back within its longest path through its entry side: a cheap
     /// test at each side.
     fn may_return(&self, beam: &RayBeam) -> bool {
-        let side = beam.side as usize;
-        let [a, b] = [side, (side + 1) % 3].map(|corner| self.mesh.corner(beam.triangle, corner));
+        let [a, b] = self.mesh.side(beam.triangle, beam.side as usize);
         let middle = 0.5 * (a + b);
         let (out, back) =
             (middle.distance_squared(beam.image), middle.distance_squared(self.target));
@@ -327,8 +326,7 @@ impl<'a> Grower<'a> {
         let run = self.target - beam.image;
         let is_in_reach = run.length_squared() <= self.longest_m(beam).powi(2);
         let is_hidden = || {
-            let side = beam.side as usize;
-            let [a, b] = [side, (side + 1) % 3].map(|end| self.mesh.corner(beam.triangle, end));
+            let [a, b] = self.mesh.side(beam.triangle, beam.side as usize);
             let share = (a - beam.image).perp_dot(b - a) / run.perp_dot(b - a);
             self.plan.cylinders.hide_in(beam.triangle, beam.image + share * run, self.target)
         };

@@ -131,9 +131,22 @@ impl<'a> Connector<'a> {
         let min_m = group.min_m + back.min_m;
         let floor = self.plan.settings.contact_floor(is_repeated, min_m).powi(2);
         let bound = group.max_strength.with(&back.max_strength);
+        self.may_be_detected(bound, min_m, floor, [&group.departures, &back.departures])
+    }
+
+    /// Returns `true` if echoes of at most this power before the beam pattern, and of at least this
+    /// length, can reach a floor of power.
+    fn may_be_detected(
+        &self,
+        bound: f64,
+        min_m: f64,
+        floor: f64,
+        [a, b]: [&Departures; 2],
+    ) -> bool {
+        // In any direction: a cheap test before the one that depends on directions.
         min_m <= self.plan.settings.max_path_m
             && bound * self.max_pattern_power() >= floor
-            && bound * self.pattern_power(&group.departures, &back.departures) >= floor
+            && bound * self.pattern_power(a, b) >= floor
     }
 
     /// Connects a half-path to others; with `once`, only to those whose number is not smaller.
@@ -154,12 +167,9 @@ impl<'a> Connector<'a> {
         for group in groups {
             let (bound, min_power) =
                 (half_path.strength.with(&group.max_strength), floor(group.min_m));
-            // In any direction: a cheap test before the one that depends on directions.
-            let may_pass = half_path.min_m + group.min_m <= self.plan.settings.max_path_m
-                && bound * self.max_pattern_power() >= min_power
-                && bound * self.pattern_power(&half_path.departures, &group.departures)
-                    >= min_power;
-            if !may_pass {
+            let min_m = half_path.min_m + group.min_m;
+            let departures = [&half_path.departures, &group.departures];
+            if !self.may_be_detected(bound, min_m, min_power, departures) {
                 continue;
             }
             for &other in group.half_paths.iter().filter(|&&other| !once || other >= number) {

@@ -344,8 +344,8 @@ impl<'a> TubeGrower<'a> {
     }
 
     fn side_of(&self, triangle: u32, side: usize) -> [DVec2; 2] {
-        let Some(mesh) = &self.plan.mesh else { return [DVec2::ZERO; 2] };
-        [side, (side + 1) % 3].map(|corner| mesh.corner(triangle, corner))
+        let mesh = self.plan.mesh.as_ref();
+        mesh.map_or([DVec2::ZERO; 2], |mesh| mesh.side(triangle, side))
     }
 
     /// Adds rays to the corners of the tube's triangle that are edges, and returns where corners

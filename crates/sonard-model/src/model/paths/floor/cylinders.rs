@@ -192,7 +192,7 @@ impl PlanCircle {
     fn spans_in(&self, mesh: &Mesh, triangle: u32) -> SmallVec<[AngleSpan; 1]> {
         let mut cuts: SmallVec<[f64; 6]> = SmallVec::new();
         for side in 0..3 {
-            let (a, b) = (mesh.corner(triangle, side), mesh.corner(triangle, (side + 1) % 3));
+            let [a, b] = mesh.side(triangle, side);
             let along = (b - a).normalize();
             let foot = (self.center - a).dot(along);
             let height = along.perp_dot(self.center - a);

@@ -91,17 +91,21 @@ impl Mesh {
 
     /// Returns the ends of all sides that are walls; a side of two triangles is listed twice.
     pub(crate) fn walls(&self) -> impl Iterator<Item = [DVec2; 2]> {
-        self.triangles.iter().flat_map(move |triangle| {
+        self.triangles.iter().zip(0..).flat_map(move |(of, triangle)| {
             (0..3)
-                .filter(|side| matches!(triangle.sides[*side], TriangleSide::Wall(_)))
-                .map(|side| [side, (side + 1) % 3].map(|at| triangle.corners[at]))
-                .map(|ends| ends.map(|corner| self.points[corner as usize]))
+                .filter(|side| matches!(of.sides[*side], TriangleSide::Wall(_)))
+                .map(move |side| self.side(triangle, side))
         })
     }
 
     /// Returns a corner of a triangle.
     pub(crate) fn corner(&self, triangle: u32, corner: usize) -> DVec2 {
         self.points[self.triangles[triangle as usize].corners[corner] as usize]
+    }
+
+    /// Returns the ends of a side of a triangle.
+    pub(crate) fn side(&self, triangle: u32, side: usize) -> [DVec2; 2] {
+        [side, (side + 1) % 3].map(|corner| self.corner(triangle, corner))
     }
 
     /// Returns the triangle that contains a point (one of them if it is on a side); `None` outside

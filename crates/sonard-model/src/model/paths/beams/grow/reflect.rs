@@ -87,8 +87,7 @@ impl Grower<'_> {
             return run.length();
         }
         let along = mirror.normal.perp();
-        let ends =
-            [side, (side + 1) % 3].map(|corner| along.dot(self.mesh.corner(beam.triangle, corner)));
+        let ends = self.mesh.side(beam.triangle, side).map(|end| along.dot(end));
         let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
         let by = |border: DVec2| {
             let hit = beam.image - height / mirror.normal.dot(border) * border;
@@ -109,8 +108,7 @@ impl Grower<'_> {
     ) -> [f64; 2] {
         let mirror = &wall_mirror.mirror;
         let along = mirror.normal.perp();
-        let ends =
-            [side, (side + 1) % 3].map(|corner| along.dot(self.mesh.corner(beam.triangle, corner)));
+        let ends = self.mesh.side(beam.triangle, side).map(|end| along.dot(end));
         let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
         let by = |border: DVec2| {
             let hit = beam.image
