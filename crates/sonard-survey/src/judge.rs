@@ -129,7 +129,8 @@ impl<'a> Judge<'a> {
     fn log_likelihood_above(&self, segments: &[Segment], floor: f64) -> Result<f64, f64> {
         /// Rounding of sums in different orders, nats.
         const ROUNDING: f64 = 1e-6;
-        self.workspace.count();
+        let digest = plan_digest(segments, &self.poses, self.sigma_m);
+        self.workspace.count_scene(digest);
         let sum = || {
             let Some(simulator) = self.simulator_of(segments) else { return Ok(UNSCORED) };
             let mut sum = 0.0;
@@ -146,7 +147,7 @@ impl<'a> Judge<'a> {
             }
             Ok(sum)
         };
-        self.workspace.scores.get_or(plan_digest(segments, &self.poses, self.sigma_m), sum)
+        self.workspace.scores.get_or(digest, sum)
     }
 
     /// Log-likelihood of the readings of one sweep from a pose, nats; `None` if the scene has more

@@ -24,7 +24,7 @@ pub struct SurveyProgress {
     /// Current stage.
     #[serde(flatten)]
     pub stage: SurveyStage,
-    /// Number of scenes scored so far.
+    /// Number of different scenes scored so far.
     pub scored_scenes: usize,
     /// Score of the best plan so far, nats.
     pub score: Option<f64>,

@@ -32,7 +32,7 @@ pub struct Survey {
     pub probability: f64,
     /// Reason why the search ended.
     pub end: SearchEnd,
-    /// Number of scenes scored.
+    /// Number of different scenes scored.
     pub scored_scenes: usize,
     /// Amplitude reflection coefficient assumed for all walls, 0 to 1.
     pub reflectance: f64,

@@ -1,6 +1,12 @@
 //! Inputs and limits that all stages of a survey share.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::{
+    collections::HashSet,
+    sync::{
+        Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
+};
 
 use sonard_inverse::{FitSweep, World};
 use sonard_model::model::Simulator;
@@ -31,7 +37,7 @@ pub(crate) struct Workspace<'a> {
     pub(crate) moves: Vec<Move>,
     pub(crate) observer: &'a dyn SurveyObserver,
     pub(crate) scores: &'a PlanScores,
-    scored: AtomicUsize,
+    scored: Mutex<HashSet<u64>>,
     limit: AtomicUsize,
 }
 
@@ -47,7 +53,6 @@ impl<'a> Workspace<'a> {
         let numbered = readings.iter().enumerate();
         let arcs = numbered.map(|(sweep, readings)| find_arcs(sweep, readings, errors)).collect();
         let limit = AtomicUsize::new(usize::MAX);
-        let scored = AtomicUsize::new(0);
         Self {
             world,
             sweeps,
@@ -59,7 +64,7 @@ impl<'a> Workspace<'a> {
             moves,
             observer,
             scores,
-            scored,
+            scored: Mutex::default(),
             limit,
         }
     }
@@ -80,14 +85,19 @@ impl<'a> Workspace<'a> {
         if self.moves.is_empty() { 0.15 } else { 0.3 }
     }
 
-    /// Counts a scored scene.
-    pub(crate) fn count(&self) {
-        self.scored.fetch_add(1, Ordering::Relaxed);
+    /// Counts a scored scene by the digest of its plan. A scene counts once, however often it is
+    /// scored: a search that continues with known scores repeats fewer of them.
+    pub(crate) fn count_scene(&self, plan: u64) {
+        self.lock().insert(plan);
     }
 
-    /// Number of scenes scored so far.
+    /// Number of different scenes scored so far.
     pub(crate) fn scored(&self) -> usize {
-        self.scored.load(Ordering::Relaxed)
+        self.lock().len()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, HashSet<u64>> {
+        self.scored.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Limits the number of scored scenes in all. The limit is checked between moves and rounds,

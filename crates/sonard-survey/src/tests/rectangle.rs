@@ -91,8 +91,15 @@ fn resumed_survey_is_that_of_an_uninterrupted_one() {
     assert_eq!(resumed(&scores, 100).end, SearchEnd::Budget);
     let saved = scores.entries();
     assert!(saved.len() > 50, "{}", saved.len());
+    let whole = surveyed(&NoObserver, 30_000);
     let scores: PlanScores = saved.into_iter().collect();
-    assert_eq!(resumed(&scores, 30_000), surveyed(&NoObserver, 30_000));
+    assert_eq!(resumed(&scores, 30_000), whole);
+    // The result is independent of which scores are known, as of when a search was interrupted.
+    let all = scores.entries();
+    for every in [1, 2, 3] {
+        let known: PlanScores = all.iter().copied().step_by(every).collect();
+        assert_eq!(resumed(&known, 30_000), whole, "every {every}th score is known");
+    }
 }
 
 #[test]
