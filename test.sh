@@ -298,10 +298,12 @@ check_monitoring() {
   tests/monitoring.sh
 }
 
-# Tests of the program that take long, or whose subject is load: their modules and names. They run in `all` only.
+# Tests that take long, or whose subject is load: their modules and names. They run in `all` only.
 long=(
   collect::interrupted daemon::chaos daemon::clock daemon::foxglove::cost daemon::kill daemon::load daemon::mqtt::rogue daemon::soak
   inverse::
+  ambiguous_positions_have_wide_intervals arrivals_match_boundary_integrals bandwidth_by_time_walk position_on_a_ridge
+  resumed_fit_is_bit_identical wall_roughness
 )
 # Prints the parts of its arguments between bars, as in a regular expression.
 alternatives() { local IFS='|'; printf '%s' "$*"; }
@@ -318,9 +320,10 @@ run_tests() {
   if [ "$runner" = nextest ]; then
     local filter=()
     if [ ${#skipped[@]} != 0 ]; then filter=(-E "not test(/$(alternatives "${skipped[@]}")/)"); fi
-    # Half of the tests wait for a process or a clock most of their time.
+    # Half of the tests wait for a process or a clock most of their time; the configuration of nextest counts the others
+    # twice.
     cargo nextest run "${selection[@]}" "$@" "${filter[@]}" --cargo-quiet --no-fail-fast \
-      --test-threads $((2 * $(nproc))) --status-level slow --final-status-level fail 2>&1
+      --test-threads $((3 * $(nproc))) --status-level slow --final-status-level fail 2>&1
   else
     local name skip=()
     # A browser takes the processors that other tests want.

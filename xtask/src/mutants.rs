@@ -133,7 +133,6 @@ fn try_mutants(tool: &Path, folder: &Path, jobs: usize) -> Result<(), Failure> {
         .args([format!("--test-tool={runner}"), format!("--jobs={jobs}")])
         .arg("--output")
         .arg(folder)
-        .env("CARGO_PROFILE_DEV_DEBUG", "none")
         .status()?;
     // 2: some were missed; 3: some ran out of time.
     match status.code() {
