@@ -251,3 +251,36 @@ async fn method_not_allowed() -> ApiError {
     let help = "see GET /v1/openapi.json";
     ApiError::new(StatusCode::METHOD_NOT_ALLOWED, "method not allowed", help)
 }
+
+#[cfg(test)]
+mod tests {
+    use axum::{body::Body, routing::get};
+    use tower::ServiceExt as _;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn responses_get_default_headers_even_after_a_panic() {
+        async fn panic() {
+            panic!("of a test");
+        }
+        async fn cached() -> impl IntoResponse {
+            [(header::CACHE_CONTROL, "max-age=1")]
+        }
+        let router = Router::new()
+            .route("/panic", get(panic))
+            .route("/cached", get(cached))
+            .layer(middleware::from_fn(catch_panic))
+            .layer(middleware::map_response(add_default_headers));
+        for (path, status, cache_control) in [
+            ("/panic", StatusCode::INTERNAL_SERVER_ERROR, "no-store"),
+            ("/cached", StatusCode::OK, "max-age=1"),
+        ] {
+            let request = Request::get(path).body(Body::empty()).expect("a request");
+            let response = router.clone().oneshot(request).await.expect("infallible");
+            assert_eq!(response.status(), status, "{path}");
+            assert_eq!(response.headers()[header::CACHE_CONTROL], cache_control, "{path}");
+            assert_eq!(response.headers()[header::X_CONTENT_TYPE_OPTIONS], "nosniff", "{path}");
+        }
+    }
+}
