@@ -5,7 +5,7 @@ use std::sync::{
     atomic::{AtomicBool, Ordering},
 };
 
-use rand::RngExt as _;
+use rand::{RngExt as _, rand_core::UnwrapErr, rngs::SysRng};
 
 use super::{Failure, Outcome, interruptible, output::OutPath};
 use crate::{
@@ -49,7 +49,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let pins = GpioPins::open(&args.pins).map_err(|error| Failure::device(&error, error.help()))?;
     let settings = PiSettings {
         // A counter would need storage; two consecutive random numbers hardly ever collide.
-        boot: rand::rng().random_range(1..=u16::MAX),
+        boot: UnwrapErr(SysRng).random_range(1..=u16::MAX),
         serial: args.serial,
         steps_per_revolution: args.steps_per_revolution,
     };

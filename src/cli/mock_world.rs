@@ -5,7 +5,7 @@ use std::{
     sync::Arc,
 };
 
-use rand::RngExt as _;
+use rand::{RngExt as _, rand_core::UnwrapErr, rngs::SysRng};
 
 use super::{
     Failure,
@@ -114,7 +114,7 @@ impl MockWorldArgs {
         BoardSettings {
             // Consecutive mocks are different boots, so the boot number must not come from the
             // seed.
-            boot: rand::rng().random_range(1..=u16::MAX),
+            boot: UnwrapErr(SysRng).random_range(1..=u16::MAX),
             clock: 0,
             steps_per_revolution,
             faults: self.faults.unwrap_or_default(),

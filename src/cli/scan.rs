@@ -9,6 +9,7 @@ mod summary;
 use std::path::{Path, PathBuf};
 
 use firmware_protocol::host::{HostConfig, HostError, LinkStats};
+use rand::{RngExt as _, rand_core::UnwrapErr, rngs::SysRng};
 use tokio::sync::{mpsc, oneshot};
 use tokio_serial::SerialStream;
 
@@ -250,7 +251,8 @@ pub(super) async fn identify(
     if let Some(change) = ports.take_change() {
         notice!("{change}");
     }
-    let config = HostConfig { max_attempts: ATTEMPTS, ..HostConfig::new(BAUD, rand::random()) };
+    let config =
+        HostConfig { max_attempts: ATTEMPTS, ..HostConfig::new(BAUD, UnwrapErr(SysRng).random()) };
     tokio::select! {
         identified = Ranger::identify(Driver::new(line, config)) => identified.map_err(|error| match &error {
             DriveError::Host(HostError::NoAnswer { .. } | HostError::NotADevice { .. }) => {

@@ -10,6 +10,7 @@ use firmware_protocol::{
     host::{BoardChange, HostConfig, HostError},
     messages::{FaultKind, Identity, NakReason},
 };
+use rand::{RngExt as _, rand_core::UnwrapErr, rngs::SysRng};
 use sonard_api::{ScanTotals, Trouble};
 use sonard_device::{
     link::{self, BAUD, Line, LinkError},
@@ -159,8 +160,10 @@ impl DeviceTask {
         let attempts = self.control.settings.keys.link.attempts;
         let identified = match (self.line.take(), self.ranger.take()) {
             (Some(line), _) => {
-                let config =
-                    HostConfig { max_attempts: attempts, ..HostConfig::new(BAUD, rand::random()) };
+                let config = HostConfig {
+                    max_attempts: attempts,
+                    ..HostConfig::new(BAUD, UnwrapErr(SysRng).random())
+                };
                 with_orders(&mut self.control, Ranger::identify(Driver::new(line, config))).await
             }
             (None, Some(mut ranger)) => {

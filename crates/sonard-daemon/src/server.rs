@@ -22,6 +22,7 @@ mod routes;
 mod token;
 
 use std::{
+    panic::AssertUnwindSafe,
     path::{Path, PathBuf},
     sync::{
         Arc, Mutex, PoisonError,
@@ -38,6 +39,7 @@ use axum::{
     middleware::{self, Next},
     response::{IntoResponse, Response},
 };
+use futures_util::FutureExt as _;
 use sonard_api::{config::Keys, fleet::PolledDaemon};
 use sonard_log::LogIndex;
 use sonard_model::scene::Scene;
@@ -46,7 +48,6 @@ use tokio::{
     sync::{Semaphore, watch},
     time::{Instant, timeout},
 };
-use tower_http::{catch_panic::CatchPanicLayer, set_header::SetResponseHeaderLayer};
 
 pub use access::{Access, AccessDenied, Peer, Principal};
 pub use listen::{ListenError, Listeners};
@@ -62,8 +63,16 @@ use response::{ApiError, CachedJson};
 /// Time limit until the response begins.
 const REQUEST_TIME: Duration = Duration::from_secs(10);
 
-/// Response header that keeps pages of other sites from embedding responses.
-const RESOURCE_POLICY: HeaderName = HeaderName::from_static("cross-origin-resource-policy");
+/// Headers of responses that do not set them: browsers neither guess types, nor keep responses, nor
+/// embed them in pages of other sites.
+const DEFAULT_HEADERS: [(HeaderName, HeaderValue); 3] = [
+    (header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff")),
+    (header::CACHE_CONTROL, HeaderValue::from_static("no-store")),
+    (
+        HeaderName::from_static("cross-origin-resource-policy"),
+        HeaderValue::from_static("same-origin"),
+    ),
+];
 
 /// Shared state of all request handlers.
 #[derive(Clone)]
@@ -145,19 +154,14 @@ impl Server {
             buckets: Arc::new(Mutex::new(Buckets::new(keys.max_requests_per_s))),
             epoch: Instant::now(),
         };
-        let default_header = |name, value| {
-            SetResponseHeaderLayer::if_not_present(name, HeaderValue::from_static(value))
-        };
         let router = openapi::router(endpoints)
             .fallback(not_found)
             .method_not_allowed_fallback(method_not_allowed)
             .layer(DefaultBodyLimit::max(keys.max_body_kb as usize * 1000))
             .layer(middleware::from_fn(limit_time))
             .layer(middleware::from_fn_with_state(api.clone(), check_request))
-            .layer(CatchPanicLayer::custom(|_| internal_error().into_response()))
-            .layer(default_header(header::X_CONTENT_TYPE_OPTIONS, "nosniff"))
-            .layer(default_header(header::CACHE_CONTROL, "no-store"))
-            .layer(default_header(RESOURCE_POLICY, "same-origin"))
+            .layer(middleware::from_fn(catch_panic))
+            .layer(middleware::map_response(add_default_headers))
             .with_state(api);
         Self {
             router,
@@ -221,9 +225,22 @@ async fn limit_time(request: Request, next: Next) -> Response {
     })
 }
 
+/// Makes a panic of a handler an error response; the panic hook has logged it.
+async fn catch_panic(request: Request, next: Next) -> Response {
+    let response = AssertUnwindSafe(next.run(request)).catch_unwind().await;
+    response.unwrap_or_else(|_| internal_error().into_response())
+}
+
 fn internal_error() -> ApiError {
     let help = "this is a bug: see the log messages of the daemon";
     ApiError::new(StatusCode::INTERNAL_SERVER_ERROR, "internal error", help)
+}
+
+async fn add_default_headers(mut response: Response) -> Response {
+    for (name, value) in DEFAULT_HEADERS {
+        response.headers_mut().entry(name).or_insert(value);
+    }
+    response
 }
 
 async fn not_found() -> ApiError {
@@ -233,4 +250,37 @@ async fn not_found() -> ApiError {
 async fn method_not_allowed() -> ApiError {
     let help = "see GET /v1/openapi.json";
     ApiError::new(StatusCode::METHOD_NOT_ALLOWED, "method not allowed", help)
+}
+
+#[cfg(test)]
+mod tests {
+    use axum::{body::Body, routing::get};
+    use tower::ServiceExt as _;
+
+    use super::*;
+
+    #[tokio::test]
+    async fn responses_get_default_headers_even_after_a_panic() {
+        async fn panic() {
+            panic!("of a test");
+        }
+        async fn cached() -> impl IntoResponse {
+            [(header::CACHE_CONTROL, "max-age=1")]
+        }
+        let router = Router::new()
+            .route("/panic", get(panic))
+            .route("/cached", get(cached))
+            .layer(middleware::from_fn(catch_panic))
+            .layer(middleware::map_response(add_default_headers));
+        for (path, status, cache_control) in [
+            ("/panic", StatusCode::INTERNAL_SERVER_ERROR, "no-store"),
+            ("/cached", StatusCode::OK, "max-age=1"),
+        ] {
+            let request = Request::get(path).body(Body::empty()).expect("a request");
+            let response = router.clone().oneshot(request).await.expect("infallible");
+            assert_eq!(response.status(), status, "{path}");
+            assert_eq!(response.headers()[header::CACHE_CONTROL], cache_control, "{path}");
+            assert_eq!(response.headers()[header::X_CONTENT_TYPE_OPTIONS], "nosniff", "{path}");
+        }
+    }
 }

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use jiff::Timestamp;
+use rand::{RngExt as _, rand_core::UnwrapErr, rngs::SysRng};
 use rumqttc::Publish;
 use sonard_api::MqttReport;
 use sonard_daemon::Handle;
@@ -98,7 +99,7 @@ impl Publisher {
             if self.stop.is_cancelled() {
                 break;
             }
-            let delay = backoff.next(rand::random());
+            let delay = backoff.next(UnwrapErr(SysRng).random());
             self.report_disconnection(&lost.reason);
             tokio::select! {
                 () = self.stop.cancelled() => break,

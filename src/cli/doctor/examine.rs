@@ -9,6 +9,7 @@ use firmware_protocol::{
     host::{Command, HostConfig, HostError, HostEvent, Outcome},
     messages::{Blanking, Capabilities, Identity, NakReason, Reading, ResetCause, Settings},
 };
+use rand::{RngExt as _, rand_core::UnwrapErr, rngs::SysRng};
 use tokio::{
     io::{AsyncReadExt as _, AsyncWriteExt as _},
     time::{sleep, timeout},
@@ -69,7 +70,8 @@ pub(super) async fn examine(port: &str, args: &Args, interrupts: Interrupts) -> 
         return report;
     }
     report.checks.extend(monitor.check_adapter());
-    let config = HostConfig { max_attempts: ATTEMPTS, ..HostConfig::new(BAUD, rand::random()) };
+    let config =
+        HostConfig { max_attempts: ATTEMPTS, ..HostConfig::new(BAUD, UnwrapErr(SysRng).random()) };
     let driver = Driver::new(Tap::new(line), config);
     let mut board = BoardUnderTest { driver, restarts: 0, exchanges: Vec::new() };
     tokio::select! {

@@ -1,6 +1,6 @@
 //! Services of Linux and macOS.
 
-use std::{fs::File, io, os::fd::BorrowedFd, sync::Arc, time::Instant};
+use std::{fs::File, io, os::fd::BorrowedFd, time::Instant};
 
 use rustix::{
     event::{PollFd, PollFlags, Timespec, poll},
@@ -45,8 +45,11 @@ pub(crate) fn stop_signals(with_hangup: bool) -> Vec<StopSignal> {
 /// Makes an exceeded file-size limit an error of the write, with a message, instead of the end of
 /// the process.
 pub fn ignore_file_size_signal() {
-    // If no handler can be installed, the system's default applies.
-    drop(signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default()));
+    #[expect(unsafe_code, reason = "no safe wrapper of signal(2) among the dependencies")]
+    // SAFETY: no handler runs: the signal is ignored, as a write reports its cause.
+    unsafe {
+        libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
+    }
 }
 
 /// Program that opens pictures on this desktop; `None` without a desktop.
@@ -136,5 +139,7 @@ mod tests {
         // The runtime of the standard library ignores it.
         assert!(is_ignored(libc::SIGPIPE));
         assert!(!is_ignored(libc::SIGTERM));
+        ignore_file_size_signal();
+        assert!(is_ignored(libc::SIGXFSZ));
     }
 }
