@@ -8,7 +8,7 @@ use std::{
 };
 
 use sonard_model::{
-    geometry::Pose,
+    geometry::{Pose, wrap_180, wrap_360},
     model::{Prediction, Simulator},
     reading::PingStatus,
     scene::{Material, Scene, Wall},
@@ -31,6 +31,12 @@ const WALL_NATS: f64 = 4.0;
 const FREE_END_NATS: f64 = 2.0;
 /// Price of the length of walls, nats per metre.
 const LENGTH_NATS_PER_M: f64 = 0.5;
+/// Step of directions in which readings are predicted for all headings, degrees: at most half of
+/// the step of a coarse ranger's beams.
+const DIRECTION_STEP_DEG: f64 = 1.5;
+/// Maximum turn to the likeliest heading, standard deviations of odometry and degrees.
+const MAX_TURN_SIGMAS: f64 = 2.5;
+const MAX_TURN_DEG: f64 = 20.0;
 /// Score of a plan with more paths than the model follows.
 const UNSCORED: f64 = -1e9;
 
@@ -45,6 +51,8 @@ pub(crate) struct Judge<'a> {
     pub(crate) sigma_m: f64,
     /// Maximum log-likelihood of the readings of each sweep, nats.
     max_nats: Vec<f64>,
+    /// Headings are chosen for each plan.
+    are_headings_free: bool,
     known: Mutex<HashMap<PieceSet, KnownScore>>,
 }
 
@@ -64,7 +72,26 @@ impl<'a> Judge<'a> {
             sweep_nats(readings, measured, sigma_m, workspace.reach_m())
         };
         let max_nats = workspace.readings.iter().map(of_sweep).collect();
-        Self { workspace, poses: poses.to_vec(), sigma_m, max_nats, known: Mutex::default() }
+        let (poses, known) = (poses.to_vec(), Mutex::default());
+        Self { workspace, poses, sigma_m, max_nats, are_headings_free: false, known }
+    }
+
+    /// Judge that scores each plan with the likeliest headings of all sweeps but the first.
+    pub(crate) fn with_free_headings(self) -> Self {
+        Self { are_headings_free: true, ..self }
+    }
+
+    /// Poses from which a plan is scored; `None` if the scene has more paths than the model follows.
+    pub(crate) fn poses_of(&self, segments: &[Segment]) -> Option<Vec<Pose>> {
+        if !self.are_headings_free {
+            return Some(self.poses.clone());
+        }
+        let simulator = self.simulator_of(segments)?;
+        let turned = |(sweep, pose): (usize, &Pose)| {
+            let (_, by_deg) = self.likeliest_turn(&simulator, sweep, pose)?;
+            Some(Pose { heading_deg: wrap_180(pose.heading_deg + by_deg), ..*pose })
+        };
+        self.poses.iter().enumerate().map(turned).collect()
     }
 
     /// Judge from other poses.
@@ -129,16 +156,18 @@ impl<'a> Judge<'a> {
     fn log_likelihood_above(&self, segments: &[Segment], floor: f64) -> Result<f64, f64> {
         /// Rounding of sums in different orders, nats.
         const ROUNDING: f64 = 1e-6;
-        let digest = plan_digest(segments, &self.poses, self.sigma_m);
+        let digest = self.digest(segments);
         self.workspace.count_scene(digest);
         let sum = || {
             let Some(simulator) = self.simulator_of(segments) else { return Ok(UNSCORED) };
             let mut sum = 0.0;
             let mut max_of_rest: f64 = self.max_nats.iter().sum();
             for (sweep, pose) in self.poses.iter().enumerate() {
-                let Some(nats) = self.log_likelihood_of(&simulator, sweep, pose) else {
-                    return Ok(UNSCORED);
+                let nats = match self.are_headings_free {
+                    true => self.likeliest_turn(&simulator, sweep, pose).map(|of| of.0),
+                    false => self.log_likelihood_of(&simulator, sweep, pose),
                 };
+                let Some(nats) = nats else { return Ok(UNSCORED) };
                 sum += nats;
                 max_of_rest -= self.max_nats[sweep];
                 if sum + max_of_rest < floor - ROUNDING {
@@ -148,6 +177,47 @@ impl<'a> Judge<'a> {
             Ok(sum)
         };
         self.workspace.scores.get_or(digest, sum)
+    }
+
+    /// Digest of walls, poses, standard deviation of ranges and freedom of headings.
+    fn digest(&self, segments: &[Segment]) -> u64 {
+        let of_plan = plan_digest(segments, &self.poses, self.sigma_m);
+        if self.are_headings_free { of_plan.rotate_left(1) ^ 1 } else { of_plan }
+    }
+
+    /// Log-likelihood of the readings of a sweep and of its odometry at the likeliest heading, nats,
+    /// and the turn to that heading, degrees; 0 for the first sweep, which is the frame.
+    ///
+    /// Readings are predicted once in all directions, in steps of 1.5 degrees; a heading selects
+    /// among them.
+    fn likeliest_turn(
+        &self,
+        simulator: &Simulator,
+        sweep: usize,
+        pose: &Pose,
+    ) -> Option<(f64, f64)> {
+        let sigma_deg = self.workspace.heading_sigma_deg(sweep).filter(|sigma| *sigma > 0.0);
+        let Some(sigma_deg) = sigma_deg else {
+            return Some((self.log_likelihood_of(simulator, sweep, pose)?, 0.0));
+        };
+        let predicted = predict_around(simulator, pose)?;
+        let own = &self.readings()[sweep];
+        let odometry_deg = own.odometry.heading_deg - self.readings()[0].odometry.heading_deg;
+        let off_deg = wrap_180(pose.heading_deg - self.poses[0].heading_deg - odometry_deg);
+        let max_deg = (MAX_TURN_SIGMAS * sigma_deg).min(MAX_TURN_DEG);
+        let last = (max_deg / DIRECTION_STEP_DEG) as i32;
+        let scored = (-last..=last).map(|at| {
+            let by_deg = DIRECTION_STEP_DEG * f64::from(at);
+            let outcomes = own.beams.iter().map(|beam| {
+                let direction_deg = wrap_360(pose.heading_deg + by_deg + beam.azimuth_deg);
+                let nearest = (direction_deg / DIRECTION_STEP_DEG).round() as usize;
+                predicted[nearest % predicted.len()]
+            });
+            let nats = sweep_nats(own, outcomes, self.sigma_m, self.workspace.reach_m());
+            let off = (off_deg + by_deg) / sigma_deg;
+            (nats - 0.5 * off * off, by_deg)
+        });
+        scored.max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
     /// Log-likelihood of the readings of one sweep from a pose, nats; `None` if the scene has more
@@ -215,6 +285,15 @@ fn predict(simulator: &Simulator, readings: &Readings, pose: &Pose) -> Option<Ve
     let point = simulator.at(pose.position());
     let beams = readings.beams.iter();
     beams.map(|beam| point.ping(pose.direction_rad(beam.azimuth_deg)).ok()).collect()
+}
+
+/// Predicted outcomes in all directions from a place, in steps of [`DIRECTION_STEP_DEG`].
+fn predict_around(simulator: &Simulator, pose: &Pose) -> Option<Vec<Outcome>> {
+    let point = simulator.at(pose.position());
+    let count = (360.0 / DIRECTION_STEP_DEG) as usize;
+    let direction_rad = |at: usize| (DIRECTION_STEP_DEG * at as f64).to_radians();
+    let ping = |at: usize| point.ping(direction_rad(at)).ok().map(|of| outcome_of(&of));
+    (0..count).map(ping).collect()
 }
 
 /// Predicted outcome of a beam.

@@ -209,7 +209,7 @@ impl<'a> SurveySearch<'a> {
         let mut search =
             Self { workspace, options, features: Vec::new(), posed, covariance: None, score: None };
         search.report_progress(SurveyStage::Course);
-        if workspace.errors.is_coarse() && options.odometry.is_some() {
+        if search.begins_at_odometry() {
             // Few arcs, which cut each other, determine poses less well than odometry.
             let readings = workspace.readings.iter();
             let poses: Vec<Pose> = readings.map(|readings| readings.odometry).collect();
@@ -219,6 +219,11 @@ impl<'a> SurveySearch<'a> {
             search.begin(virtual_map(&workspace.arcs, start, &workspace.moves));
         }
         search
+    }
+
+    /// Returns `true` if the sweeps begin at the poses of odometry rather than of the virtual map.
+    fn begins_at_odometry(&self) -> bool {
+        self.errors().is_coarse() && self.options.odometry.is_some()
     }
 
     /// Begins with a course and no walls.
@@ -232,7 +237,10 @@ impl<'a> SurveySearch<'a> {
     fn run(&mut self) {
         self.run_from_course();
         let count = self.workspace.arcs.len();
-        let tried = orders(count, self.options.odometry.is_some());
+        let tried = match self.begins_at_odometry() {
+            true => Vec::new(),
+            false => orders(count, self.options.odometry.is_some()),
+        };
         for order in tried {
             if self.workspace.is_over() || !self.is_course_uncertain() {
                 break;
@@ -389,9 +397,16 @@ impl<'a> SurveySearch<'a> {
         };
         let sigma_m = self.errors().sigma_m(round.sigma_m);
         let judge = Judge::new(self.workspace, &self.posed.poses, sigma_m);
+        let judge = match self.begins_at_odometry() {
+            true => judge.with_free_headings(),
+            false => judge,
+        };
         let search = PlanSearch { plan: &plan, judge: &judge, excluded: None };
         let found = search.trim(search.climb(walls));
         (self.posed.plan, self.posed.walls) = (plan, found.walls);
+        let poses = judge.poses_of(&self.posed.plan.segments(&self.posed.walls));
+        self.posed.poses = poses.unwrap_or(judge.poses);
+        let judge = Judge::new(self.workspace, &self.posed.poses, sigma_m);
         self.improve_poses(&judge, number);
         self.refine(&judge, self.errors().gate_m(round.gate_m));
         self.score = Some(self.score_now(sigma_m));

@@ -79,6 +79,13 @@ impl<'a> Workspace<'a> {
         self.world.air.sound_speed_m_s() / self.world.sensor.frequency_hz
     }
 
+    /// Standard deviation of the heading of a sweep by odometry, relative to the first, degrees; 0
+    /// for the first, `None` without odometry.
+    pub(crate) fn heading_sigma_deg(&self, sweep: usize) -> Option<f64> {
+        let moves = self.moves.get(..sweep)?;
+        Some(moves.iter().map(|step| step.sigma_deg * step.sigma_deg).sum::<f64>().sqrt())
+    }
+
     /// Share of its arcs unexplained beyond which the pose of a sweep may be wrong; less without
     /// odometry, where nothing else confirms a pose.
     pub(crate) fn max_unexplained_share(&self) -> f64 {

@@ -237,3 +237,38 @@ fn climbing_closes_the_room() {
     }
     assert!((found.score - judge.score(&plan, &truth)).abs() < 1e-6, "{found:?}");
 }
+
+/// A plan is scored from the headings at which its predictions agree with the readings, within the
+/// step of directions, and the score is that of those headings.
+#[test]
+fn free_headings_are_those_of_the_readings() {
+    const OFF_DEG: [f64; 4] = [0.0, 6.0, -5.0, 7.0];
+    let (corners, poses) = (rectangle(), stops());
+    let world = world(&corners);
+    let turned = |(pose, off_deg): (&Pose, f64)| Pose {
+        heading_deg: wrap_180(pose.heading_deg + off_deg),
+        ..*pose
+    };
+    let odometry: Vec<Pose> = poses.iter().zip(OFF_DEG).map(turned).collect();
+    let sweeps = sweeps(&world, &poses, &odometry);
+    let sigma = OdometrySigma { deg_per_stop: 5.0, ..OdometrySigma::default() };
+    let options = SurveyOptions { odometry: Some(sigma), ..options() };
+    let scores = PlanScores::default();
+    let workspace = workspace(&world, &sweeps, &options, (&NoObserver, &scores)).expect("arcs");
+    let (plan, walls) = plan_of(&sides(&corners), &poses);
+    let segments = plan.segments(&walls);
+    let fixed = Judge::new(&workspace, &odometry, 0.01);
+    assert_eq!(fixed.poses_of(&segments), Some(odometry.clone()));
+    let judge = Judge::new(&workspace, &odometry, 0.01).with_free_headings();
+    let found = judge.poses_of(&segments).expect("few paths");
+    for (found, pose) in found.iter().zip(&poses) {
+        assert!(wrap_180(found.heading_deg - pose.heading_deg).abs() < 1.6, "{found:?} {pose:?}");
+    }
+    // Scores with free and with fixed headings are kept apart.
+    let [free, off] = [&judge, &fixed].map(|judge| judge.score(&plan, &walls));
+    let truth = fixed.at_poses(&poses).score(&plan, &walls);
+    assert!(free > off + 100.0 && free < truth, "{off} {free} {truth}");
+    assert_eq!(judge.score(&plan, &walls), free);
+    let again = Judge::new(&workspace, &odometry, 0.01).with_free_headings();
+    assert_eq!(again.score(&plan, &walls), free);
+}
