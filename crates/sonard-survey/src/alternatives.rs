@@ -4,6 +4,7 @@ use sonard_model::geometry::DVec2;
 
 use crate::{
     arrangement::{LineArrangement, PieceSet, Run, Segment},
+    covariance::PlanCovariance,
     judge::Judge,
     posed::PosedPlan,
     result::{PieceStatus, WallPiece},
@@ -17,6 +18,10 @@ pub(crate) const LISTED_NATS: f64 = 10.0;
 const IMPLIED_NATS: f64 = 3.0;
 /// Evidence above which no plan without a wall is searched, nats.
 const CERTAIN_NATS: f64 = 60.0;
+/// Maximum standard deviations of the direction of an observed wall, degrees, and of its distance,
+/// metres: its 95 % interval is within 6 degrees and 6 cm.
+const MAX_SIGMA_DEG: f64 = 3.0;
+const MAX_SIGMA_M: f64 = 0.03;
 /// Maximum distance of points of plans that are the same, metres.
 const SAME_M: f64 = 0.02;
 
@@ -39,7 +44,11 @@ pub(crate) struct Assessment {
 }
 
 /// Judges each wall by the best plan without it, and each piece by the paths that it reflects.
-pub(crate) fn assess(posed: &PosedPlan, judge: &Judge) -> Assessment {
+pub(crate) fn assess(
+    posed: &PosedPlan,
+    judge: &Judge,
+    covariance: Option<&PlanCovariance>,
+) -> Assessment {
     let plan = &posed.plan;
     let best = ScoredPlan { walls: posed.walls.clone(), score: judge.score(plan, &posed.walls) };
     let observed = observed_stretches(plan, &best.walls, judge);
@@ -56,11 +65,17 @@ pub(crate) fn assess(posed: &PosedPlan, judge: &Judge) -> Assessment {
             assessment.add(plan, &best, &other);
         }
         let lead_nats = lead_nats.min(evidence_nats);
-        // A wall that a listed alternative lacks is not observed.
-        let observed = if lead_nats > LISTED_NATS { observed } else { Vec::new() };
+        let segment = plan.segment(&run);
+        let middle_m = plan.lines[run.line].along_m(0.5 * (segment.a + segment.b));
+        let sigma = covariance.and_then(|covariance| covariance.line_sigma(run.line, middle_m));
+        let is_determined = sigma.is_none_or(|[direction_deg, across_m]| {
+            direction_deg <= MAX_SIGMA_DEG && across_m <= MAX_SIGMA_M
+        });
+        // A wall that a listed alternative lacks is not observed, either.
+        let is_observed = lead_nats > LISTED_NATS && is_determined;
+        let observed = if is_observed { observed } else { Vec::new() };
         let is_needed = lead_nats > IMPLIED_NATS;
         let pieces = pieces(plan, judge, &best, &run, &observed, is_needed);
-        let segment = plan.segment(&run);
         assessment.walls.push(JudgedWall { run, segment, evidence_nats, pieces });
     }
     assessment.alternatives.sort_by(|a, b| b.1.total_cmp(&a.1));

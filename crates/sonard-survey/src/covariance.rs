@@ -17,6 +17,12 @@ impl PlanCovariance {
         Self { matrix, columns }
     }
 
+    /// Covariance with all entries multiplied.
+    #[cfg(test)]
+    pub(crate) fn scaled(&self, by: f64) -> Self {
+        Self { matrix: by * &self.matrix, columns: self.columns.clone() }
+    }
+
     /// Standard deviations of a pose: x, y in metres and heading in degrees; 0 for the first.
     pub(crate) fn pose_sigma(&self, pose: usize) -> [f64; 3] {
         let Some(at) = pose_column(pose) else { return [0.0; 3] };

@@ -488,7 +488,7 @@ impl<'a> SurveySearch<'a> {
             let judge = Judge::new(self.workspace, &self.posed.poses, sigma_m);
             polish(&mut self.posed, &judge);
             let judge = Judge::new(self.workspace, &self.posed.poses, sigma_m);
-            let mut assessment = assess(&self.posed, &judge);
+            let mut assessment = assess(&self.posed, &judge, self.covariance.as_ref());
             match assessment.better.take().filter(|_| !is_last) {
                 Some(better) => {
                     self.posed.walls = better.walls;

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::{
-    alternatives::assess, judge::Judge, posed::PosedPlan, progress::NoObserver,
+    alternatives::assess, judge::Judge, posed::PosedPlan, progress::NoObserver, refine::refine,
     relocate::relocated, result::PieceStatus, symmetry::equivalent_poses,
 };
 
@@ -26,7 +26,7 @@ fn wall_without_evidence_is_never_observed() {
         walls.push(extra);
         let (plan, set) = plan_of(&walls, &poses);
         let posed = PosedPlan { plan, walls: set, poses: poses.clone() };
-        let assessment = assess(&posed, &judge);
+        let assessment = assess(&posed, &judge, None);
         let added: Vec<_> = assessment.walls.iter().filter(|wall| wall.segment.line == 4).collect();
         assert!(!added.is_empty());
         for wall in added {
@@ -50,7 +50,7 @@ fn walls_of_a_lost_course_are_not_observed() {
     let observed = |poses: &[Pose]| {
         let judge = Judge::new(&workspace, poses, 0.004);
         let (plan, walls) = plan_of(&sides(&corners), poses);
-        let assessment = assess(&PosedPlan { plan, walls, poses: poses.to_vec() }, &judge);
+        let assessment = assess(&PosedPlan { plan, walls, poses: poses.to_vec() }, &judge, None);
         let pieces = assessment.walls.iter().flat_map(|wall| &wall.pieces);
         pieces.filter(|piece| piece.status == PieceStatus::Observed).count()
     };
@@ -60,6 +60,33 @@ fn walls_of_a_lost_course_are_not_observed() {
         (pose.x_m, pose.heading_deg) = (pose.x_m - 0.3, pose.heading_deg + 40.0);
     }
     assert_eq!(observed(&poses), 0);
+}
+
+/// Walls whose directions or distances have wide intervals are there, but not observed.
+#[test]
+fn walls_with_wide_intervals_are_not_observed() {
+    let (corners, poses) = (rectangle(), stops());
+    let world = world(&corners);
+    let sweeps = sweeps(&world, &poses, &poses);
+    let scores = PlanScores::default();
+    let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
+    let judge = Judge::new(&workspace, &poses, 0.004);
+    let (plan, walls) = plan_of(&sides(&corners), &poses);
+    let mut posed = PosedPlan { plan, walls, poses: poses.clone() };
+    let covariance = refine(&mut posed, &judge, 0.012, 3).expect("a determined plan");
+    let observed = |widened: f64| {
+        let assessment = assess(&posed, &judge, Some(&covariance.scaled(widened * widened)));
+        let pieces = assessment.walls.iter().flat_map(|wall| &wall.pieces);
+        pieces.filter(|piece| piece.status == PieceStatus::Observed).count()
+    };
+    assert!(observed(1.0) >= 4);
+    let middle_m = |wall: &[DVec2; 2], line: &Line| line.along_m(wall[0].midpoint(wall[1]));
+    let walls = sides(&corners);
+    let sigma = walls.iter().zip(&posed.plan.lines).enumerate().map(|(at, (wall, line))| {
+        covariance.line_sigma(at, middle_m(wall, line)).expect("a line of the fit")
+    });
+    let least_deg = sigma.map(|[direction_deg, _]| direction_deg).fold(f64::INFINITY, f64::min);
+    assert_eq!(observed(3.1 / least_deg), 0);
 }
 
 /// A rectangle looks alike from two poses half a turn apart; odometry excludes one of them.
@@ -132,7 +159,7 @@ fn walls_among_unexplained_arcs_are_not_observed() {
         let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
         let judge = Judge::new(&workspace, &truth, 0.004);
         let (plan, walls) = plan_of(&sides(&corners), &truth);
-        let assessment = assess(&PosedPlan { plan, walls, poses: truth.clone() }, &judge);
+        let assessment = assess(&PosedPlan { plan, walls, poses: truth.clone() }, &judge, None);
         let mut pieces = assessment.walls.iter().flat_map(|wall| &wall.pieces);
         assert_eq!(pieces.any(|piece| piece.status == PieceStatus::Observed), is_observed);
     }
