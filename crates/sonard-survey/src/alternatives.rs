@@ -30,6 +30,8 @@ const SAME_M: f64 = 0.02;
 pub(crate) struct JudgedWall {
     pub(crate) run: Run,
     pub(crate) segment: Segment,
+    /// Standard deviations of its direction, degrees, and of its distance at its middle, metres.
+    pub(crate) sigma: Option<[f64; 2]>,
     /// Loss of score without the wall, others unchanged, nats.
     pub(crate) evidence_nats: f64,
     pub(crate) pieces: Vec<WallPiece>,
@@ -76,7 +78,7 @@ pub(crate) fn assess(
         let observed = if is_observed { observed } else { Vec::new() };
         let is_needed = lead_nats > IMPLIED_NATS;
         let pieces = pieces(plan, judge, &best, &run, &observed, is_needed);
-        assessment.walls.push(JudgedWall { run, segment, evidence_nats, pieces });
+        assessment.walls.push(JudgedWall { run, segment, sigma, evidence_nats, pieces });
     }
     assessment.alternatives.sort_by(|a, b| b.1.total_cmp(&a.1));
     assessment

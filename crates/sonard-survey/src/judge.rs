@@ -181,8 +181,15 @@ impl<'a> Judge<'a> {
 
     /// Digest of walls, poses, standard deviation of ranges and freedom of headings.
     fn digest(&self, segments: &[Segment]) -> u64 {
-        let of_plan = plan_digest(segments, &self.poses, self.sigma_m);
-        if self.are_headings_free { of_plan.rotate_left(1) ^ 1 } else { of_plan }
+        let mut hasher = DefaultHasher::new();
+        segments.len().hash(&mut hasher);
+        let ends = segments.iter().flat_map(|wall| [wall.a.to_array(), wall.b.to_array()]);
+        let poses = self.poses.iter().flat_map(|pose| [pose.x_m, pose.y_m, pose.heading_deg]);
+        for value in ends.flatten().chain(poses).chain([self.sigma_m]) {
+            value.to_bits().hash(&mut hasher);
+        }
+        self.are_headings_free.hash(&mut hasher);
+        hasher.finish()
     }
 
     /// Log-likelihood of the readings of a sweep and of its odometry at the likeliest heading, nats,
@@ -252,18 +259,6 @@ impl<'a> Judge<'a> {
             self.readings().iter().zip(&self.poses).map(of_sweep).collect();
         all.map(|all| (simulator, all))
     }
-}
-
-/// Digest of walls, poses and standard deviation of ranges in metres.
-fn plan_digest(segments: &[Segment], poses: &[Pose], sigma_m: f64) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    segments.len().hash(&mut hasher);
-    let ends = segments.iter().flat_map(|wall| [wall.a.to_array(), wall.b.to_array()]);
-    let poses = poses.iter().flat_map(|pose| [pose.x_m, pose.y_m, pose.heading_deg]);
-    for value in ends.flatten().chain(poses).chain([sigma_m]) {
-        value.to_bits().hash(&mut hasher);
-    }
-    hasher.finish()
 }
 
 /// Scene with walls of the first material of a template; walls keep their index.

@@ -117,14 +117,12 @@ fn surveyed(
         let corner = |by: usize| covariance?.corner([run.line, by], plan);
         SurveyedEnd { at_m, covariance_m2: by.and_then(corner) }
     };
-    let middle_m = plan.lines[run.line].along_m(0.5 * (wall.segment.a + wall.segment.b));
-    let sigma = covariance.and_then(|covariance| covariance.line_sigma(run.line, middle_m));
     SurveyedWall {
         id: format!("wall-{}", at + 1),
         from: end(run.first, wall.segment.a.to_array()),
         to: end(run.last + 1, wall.segment.b.to_array()),
-        sigma_direction_deg: sigma.map(|[direction_deg, _]| direction_deg),
-        sigma_across_m: sigma.map(|[_, across_m]| across_m),
+        sigma_direction_deg: wall.sigma.map(|[direction_deg, _]| direction_deg),
+        sigma_across_m: wall.sigma.map(|[_, across_m]| across_m),
         evidence_nats: wall.evidence_nats,
         pieces: wall.pieces.clone(),
     }

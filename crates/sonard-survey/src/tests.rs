@@ -99,6 +99,14 @@ fn options() -> SurveyOptions {
     SurveyOptions { odometry: Some(OdometrySigma::default()), ..SurveyOptions::default() }
 }
 
+/// Corners of the rectangle, stops, the room as a world, and sweeps with true poses as odometry.
+fn true_rectangle() -> (Vec<DVec2>, Vec<Pose>, World, Vec<FitSweep>) {
+    let (corners, poses) = (rectangle(), stops());
+    let world = world(&corners);
+    let sweeps = sweeps(&world, &poses, &poses);
+    (corners, poses, world, sweeps)
+}
+
 /// Workspace of sweeps with true poses as odometry.
 fn true_workspace<'a>(
     world: &World,

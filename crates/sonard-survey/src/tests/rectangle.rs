@@ -40,9 +40,7 @@ fn rectangle_is_found_from_drifting_odometry() {
     assert!(pieces().any(|piece| piece.status == PieceStatus::Observed));
     assert!(pieces().all(|piece| piece.status != PieceStatus::Conjectured), "{found:#?}");
     // The score is that of the true room, except for the last tenths of a millimetre.
-    let (corners, poses) = (rectangle(), stops());
-    let world = world(&corners);
-    let sweeps = sweeps(&world, &poses, &poses);
+    let (corners, poses, world, sweeps) = true_rectangle();
     let truth = score_plan(&world, &sweeps, &options(), &sides(&corners), &poses);
     assert!((found.score - truth.expect("a score")).abs() < 3.0, "{}", found.score);
     let scene = found.scene("found", false).build().expect("a valid scene");
@@ -104,9 +102,7 @@ fn resumed_survey_is_that_of_an_uninterrupted_one() {
 
 #[test]
 fn unusable_input_is_rejected() {
-    let (corners, poses) = (rectangle(), stops());
-    let world = world(&corners);
-    let all = sweeps(&world, &poses, &poses);
+    let (_, _, world, all) = true_rectangle();
     let with = |sweeps: &[FitSweep], options: &SurveyOptions| {
         survey(&world, sweeps, options, &NoObserver).expect_err("no survey")
     };

@@ -21,9 +21,7 @@ use crate::{
 /// its own distance.
 #[test]
 fn arcs_are_at_distances_of_walls_and_corners() {
-    let (corners, poses) = (rectangle(), stops());
-    let world = world(&corners);
-    let sweeps = sweeps(&world, &poses, &poses);
+    let (corners, poses, world, sweeps) = true_rectangle();
     let scores = PlanScores::default();
     let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
     for (at, (readings, pose)) in workspace.readings.iter().zip(&poses).enumerate() {
@@ -103,9 +101,7 @@ fn course_is_found_backwards() {
 /// The estimate by all readings corrects poses and lines.
 #[test]
 fn polish_returns_to_the_true_room() {
-    let (corners, truth) = (rectangle(), stops());
-    let world = world(&corners);
-    let sweeps = sweeps(&world, &truth, &truth);
+    let (corners, truth, world, sweeps) = true_rectangle();
     let scores = PlanScores::default();
     let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
     let mut poses = truth.clone();
@@ -153,9 +149,7 @@ fn lines_of_a_rectangle_have_one_cell() {
 /// The true room scores higher than each room that one move away from it.
 #[test]
 fn truth_is_not_beaten_by_its_neighbours() {
-    let (corners, poses) = (rectangle(), stops());
-    let world = world(&corners);
-    let sweeps = sweeps(&world, &poses, &poses);
+    let (corners, poses, world, sweeps) = true_rectangle();
     let scores = PlanScores::default();
     let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
     let judge = Judge::new(&workspace, &poses, 0.004);
@@ -186,9 +180,7 @@ fn truth_is_not_beaten_by_its_neighbours() {
 /// A floor excludes exactly the plans that do not score above it, whichever floor comes first.
 #[test]
 fn floors_exclude_only_lower_scores() {
-    let (corners, poses) = (rectangle(), stops());
-    let world = world(&corners);
-    let sweeps = sweeps(&world, &poses, &poses);
+    let (corners, poses, world, sweeps) = true_rectangle();
     let scores = PlanScores::default();
     let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
     let (plan, walls) = plan_of(&sides(&corners), &poses);
@@ -213,9 +205,7 @@ fn floors_exclude_only_lower_scores() {
 /// From the walls at perpendiculars alone the search closes the room.
 #[test]
 fn climbing_closes_the_room() {
-    let (corners, poses) = (rectangle(), stops());
-    let world = world(&corners);
-    let sweeps = sweeps(&world, &poses, &poses);
+    let (corners, poses, world, sweeps) = true_rectangle();
     let scores = PlanScores::default();
     let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
     let judge = Judge::new(&workspace, &poses, 0.004);

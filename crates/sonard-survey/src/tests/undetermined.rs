@@ -10,9 +10,7 @@ use crate::{
 /// room that is not there.
 #[test]
 fn wall_without_evidence_is_never_observed() {
-    let (corners, poses) = (rectangle(), stops());
-    let world = world(&corners);
-    let sweeps = sweeps(&world, &poses, &poses);
+    let (corners, poses, world, sweeps) = true_rectangle();
     let scores = PlanScores::default();
     let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
     let judge = Judge::new(&workspace, &poses, 0.004);
@@ -42,9 +40,7 @@ fn wall_without_evidence_is_never_observed() {
 /// A course with two wrong poses of four explains half of the arcs only.
 #[test]
 fn walls_of_a_lost_course_are_not_observed() {
-    let (corners, truth) = (rectangle(), stops());
-    let world = world(&corners);
-    let sweeps = sweeps(&world, &truth, &truth);
+    let (corners, truth, world, sweeps) = true_rectangle();
     let scores = PlanScores::default();
     let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
     let observed = |poses: &[Pose]| {
@@ -65,36 +61,30 @@ fn walls_of_a_lost_course_are_not_observed() {
 /// Walls whose directions or distances have wide intervals are there, but not observed.
 #[test]
 fn walls_with_wide_intervals_are_not_observed() {
-    let (corners, poses) = (rectangle(), stops());
-    let world = world(&corners);
-    let sweeps = sweeps(&world, &poses, &poses);
+    let (corners, poses, world, sweeps) = true_rectangle();
     let scores = PlanScores::default();
     let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
     let judge = Judge::new(&workspace, &poses, 0.004);
     let (plan, walls) = plan_of(&sides(&corners), &poses);
     let mut posed = PosedPlan { plan, walls, poses: poses.clone() };
     let covariance = refine(&mut posed, &judge, 0.012, 3).expect("a determined plan");
+    let assessed =
+        |widened: f64| assess(&posed, &judge, Some(&covariance.scaled(widened * widened))).walls;
     let observed = |widened: f64| {
-        let assessment = assess(&posed, &judge, Some(&covariance.scaled(widened * widened)));
-        let pieces = assessment.walls.iter().flat_map(|wall| &wall.pieces);
+        let walls = assessed(widened);
+        let pieces = walls.iter().flat_map(|wall| &wall.pieces);
         pieces.filter(|piece| piece.status == PieceStatus::Observed).count()
     };
     assert!(observed(1.0) >= 4);
-    let middle_m = |wall: &[DVec2; 2], line: &Line| line.along_m(wall[0].midpoint(wall[1]));
-    let walls = sides(&corners);
-    let sigma = walls.iter().zip(&posed.plan.lines).enumerate().map(|(at, (wall, line))| {
-        covariance.line_sigma(at, middle_m(wall, line)).expect("a line of the fit")
-    });
-    let least_deg = sigma.map(|[direction_deg, _]| direction_deg).fold(f64::INFINITY, f64::min);
+    let sigma_deg = assessed(1.0).into_iter().map(|wall| wall.sigma.expect("a line of the fit")[0]);
+    let least_deg = sigma_deg.fold(f64::INFINITY, f64::min);
     assert_eq!(observed(3.1 / least_deg), 0);
 }
 
 /// A rectangle looks alike from two poses half a turn apart; odometry excludes one of them.
 #[test]
 fn half_turn_of_a_rectangle_is_open_without_odometry() {
-    let (corners, poses) = (rectangle(), stops());
-    let world = world(&corners);
-    let sweeps = sweeps(&world, &poses, &poses);
+    let (corners, poses, world, sweeps) = true_rectangle();
     let (plan, walls) = plan_of(&sides(&corners), &poses);
     let posed = PosedPlan { plan, walls, poses: poses.clone() };
     for odometry in [None, options().odometry] {
@@ -118,9 +108,7 @@ fn half_turn_of_a_rectangle_is_open_without_odometry() {
 /// A pose far from the true one, by which the walls of the others explain nothing.
 #[test]
 fn lost_sweep_is_located_in_the_plan_of_the_others() {
-    let (corners, truth) = (rectangle(), stops());
-    let world = world(&corners);
-    let sweeps = sweeps(&world, &truth, &truth);
+    let (corners, truth, world, sweeps) = true_rectangle();
     let options = SurveyOptions { odometry: None, ..options() };
     let scores = PlanScores::default();
     let workspace = workspace(&world, &sweeps, &options, (&NoObserver, &scores)).expect("sweeps");
@@ -144,9 +132,7 @@ fn lost_sweep_is_located_in_the_plan_of_the_others() {
 /// leaves in all sweeps together.
 #[test]
 fn walls_among_unexplained_arcs_are_not_observed() {
-    let (corners, truth) = (rectangle(), stops());
-    let world = world(&corners);
-    let clear = sweeps(&world, &truth, &truth);
+    let (corners, truth, world, clear) = true_rectangle();
     let mut cluttered = clear.clone();
     for sweep in &mut cluttered {
         for beam in &mut sweep.beams[100..116] {
