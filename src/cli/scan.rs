@@ -8,8 +8,7 @@ mod summary;
 
 use std::path::{Path, PathBuf};
 
-use firmware_protocol::host::{HostConfig, HostError, LinkStats};
-use rand::{RngExt as _, rand_core::UnwrapErr, rngs::SysRng};
+use firmware_protocol::host::{HostError, LinkStats};
 use tokio::sync::{mpsc, oneshot};
 use tokio_serial::SerialStream;
 
@@ -26,7 +25,7 @@ use super::{
     runtime::Interrupts,
 };
 use crate::{
-    link::{self, BAUD, PortOpener},
+    link::{self, PortOpener},
     mock::{EchoTable, MockBoard, MockPort},
     model::OptionKeys,
     ranger::{DriveError, Driver, Motion, PreparedScan, Ranger, ScanError, ScanSummary},
@@ -251,10 +250,8 @@ pub(super) async fn identify(
     if let Some(change) = ports.take_change() {
         notice!("{change}");
     }
-    let config =
-        HostConfig { max_attempts: ATTEMPTS, ..HostConfig::new(BAUD, UnwrapErr(SysRng).random()) };
     tokio::select! {
-        identified = Ranger::identify(Driver::new(line, config)) => identified.map_err(|error| match &error {
+        identified = Ranger::identify(Driver::new(line, link::host_config(ATTEMPTS))) => identified.map_err(|error| match &error {
             DriveError::Host(HostError::NoAnswer { .. } | HostError::NotADevice { .. }) => {
                 let help = link::describe_contention(port);
                 Failure::device(error, help.unwrap_or_else(|| error.help().to_owned()))

@@ -7,13 +7,12 @@ mod scan;
 use std::{pin::Pin, sync::Arc, time::Duration};
 
 use firmware_protocol::{
-    host::{BoardChange, HostConfig, HostError},
+    host::{BoardChange, HostError},
     messages::{FaultKind, Identity, NakReason},
 };
-use rand::{RngExt as _, rand_core::UnwrapErr, rngs::SysRng};
 use sonard_api::{ScanTotals, Trouble};
 use sonard_device::{
-    link::{self, BAUD, Line, LinkError},
+    link::{self, Line, LinkError},
     ranger::{DeviceEvent, DriveError, Driver, Ranger, serial_text},
 };
 use sonard_model::{geometry::Pose, scene::Scene};
@@ -160,11 +159,8 @@ impl DeviceTask {
         let attempts = self.control.settings.keys.link.attempts;
         let identified = match (self.line.take(), self.ranger.take()) {
             (Some(line), _) => {
-                let config = HostConfig {
-                    max_attempts: attempts,
-                    ..HostConfig::new(BAUD, UnwrapErr(SysRng).random())
-                };
-                with_orders(&mut self.control, Ranger::identify(Driver::new(line, config))).await
+                let driver = Driver::new(line, link::host_config(attempts));
+                with_orders(&mut self.control, Ranger::identify(driver)).await
             }
             (None, Some(mut ranger)) => {
                 let again = async {

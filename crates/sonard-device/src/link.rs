@@ -17,6 +17,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use firmware_protocol::host::HostConfig;
+use rand::{RngExt as _, rand_core::UnwrapErr, rngs::SysRng};
 use rustix::{
     fs::{Mode, OFlags},
     io::Errno,
@@ -42,6 +44,13 @@ impl<T: AsyncRead + AsyncWrite + Send + Unpin> Line for T {}
 
 /// Line rate of the firmware, bits per second (8N1).
 pub const BAUD: u32 = 115_200;
+
+/// Settings of the host machine on a line of [`BAUD`]: numbers from a random seed, and up to
+/// `max_attempts` transmissions of a request.
+#[must_use]
+pub fn host_config(max_attempts: u8) -> HostConfig {
+    HostConfig { max_attempts, ..HostConfig::new(BAUD, UnwrapErr(SysRng).random()) }
+}
 
 /// Opens a line for the ranger's protocol, locked against other programs and with an empty input
 /// buffer.

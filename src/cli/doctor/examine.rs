@@ -6,10 +6,9 @@ use std::{
 };
 
 use firmware_protocol::{
-    host::{Command, HostConfig, HostError, HostEvent, Outcome},
+    host::{Command, HostError, HostEvent, Outcome},
     messages::{Blanking, Capabilities, Identity, NakReason, Reading, ResetCause, Settings},
 };
-use rand::{RngExt as _, rand_core::UnwrapErr, rngs::SysRng};
 use tokio::{
     io::{AsyncReadExt as _, AsyncWriteExt as _},
     time::{sleep, timeout},
@@ -28,7 +27,7 @@ use super::{
 };
 use crate::{
     cli::{runtime::Interrupts, scan::ATTEMPTS},
-    link::{self, BAUD, LinkError},
+    link::{self, LinkError},
     ranger::{CommandResult, DriveError, Driver, hold_s, serial_text},
 };
 
@@ -70,9 +69,7 @@ pub(super) async fn examine(port: &str, args: &Args, interrupts: Interrupts) -> 
         return report;
     }
     report.checks.extend(monitor.check_adapter());
-    let config =
-        HostConfig { max_attempts: ATTEMPTS, ..HostConfig::new(BAUD, UnwrapErr(SysRng).random()) };
-    let driver = Driver::new(Tap::new(line), config);
+    let driver = Driver::new(Tap::new(line), link::host_config(ATTEMPTS));
     let mut board = BoardUnderTest { driver, restarts: 0, exchanges: Vec::new() };
     tokio::select! {
         examined = board.examine(args, &mut report.checks) => {
