@@ -12,7 +12,7 @@ use sonard::server::Peer;
 use sonard_test_support::in_process::Daemon;
 
 use super::{self as processes, Reply, read_reply, send_request, write_token};
-use crate::common::wait_until;
+use crate::common::{SetOnDrop, wait_until};
 
 const TOKEN: &str = "0123456789abcdef0123456789abcdef";
 
@@ -189,6 +189,7 @@ fn loopback_without_token() {
     wait_until("the strangers' streams", || streaming() >= Some(64));
     let over = AtomicBool::new(false);
     let refused = thread::scope(|scope| {
+        let end = SetOnDrop(&over);
         let flood = |host: &'static str| {
             let (daemon, over) = (&daemon, &over);
             scope.spawn(move || {
@@ -213,7 +214,7 @@ fn loopback_without_token() {
         }
         assert_eq!(daemon.send("POST", "/v1/stop", "").status, 202);
         assert_eq!(daemon.send("POST", "/v1/start", "{}").status, 202);
-        over.store(true, Ordering::Relaxed);
+        drop(end);
         floods.into_iter().map(|one| one.join().expect("no panic")).sum::<usize>()
     });
     assert!(refused > 0, "the strangers are answered, too");

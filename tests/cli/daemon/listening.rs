@@ -86,6 +86,7 @@ fn busy_tcp_port() {
     drop(taken);
     wait_until("the address", || TcpStream::connect(&address).is_ok());
     wait_until("health", || health_by_tcp(&address)["healthy"] == true);
+    wait_until("the message", || count(&daemon, "listening on http://") > 0);
     assert_eq!(count(&daemon, "listening on http://"), 1, "{}", daemon.messages());
     assert_eq!(daemon.stop(), Some(0));
 }

@@ -11,7 +11,7 @@ use serde_json::Value;
 use sonard::mock::Pace;
 
 use super::{Daemon, clean_log, memory_kb, own_kb, resident_kb, rig::Rig};
-use crate::common::{cpu_s, wait_until};
+use crate::common::{SetOnDrop, cpu_s, wait_until};
 
 /// Share of a core that a process used over a while.
 fn core_share(daemon: &Daemon, over: Duration) -> f64 {
@@ -175,6 +175,7 @@ fn large_scans_to_slow_clients() {
     daemon.wait_for("ready");
     let over = AtomicBool::new(false);
     let (idle_kb, taken_kb) = std::thread::scope(|scope| {
+        let _end = SetOnDrop(&over);
         forget_peak(daemon.id());
         let idle_kb = resident_kb(daemon.id());
         for at in 0..100 {
@@ -188,7 +189,6 @@ fn large_scans_to_slow_clients() {
         daemon.wait_for_scans(1);
         // The scan goes out to all of them meanwhile.
         std::thread::sleep(Duration::from_secs(5));
-        over.store(true, Ordering::Relaxed);
         (idle_kb, peak_kb(daemon.id()))
     });
     let beams = daemon.health()["scans"]["beams"].as_u64();
@@ -220,6 +220,7 @@ fn large_scans_to_slow_clients() {
         format!("/v1/scans/{}", large.expect("the large scan")["scan"].as_str().expect("an id"));
     let over = AtomicBool::new(false);
     let mut late_ms = std::thread::scope(|scope| {
+        let _end = SetOnDrop(&over);
         for _ in 0..10 {
             let (stream, over) = (ask_for(&daemon, &path), &over);
             scope.spawn(move || read_slowly(stream, over));
@@ -234,9 +235,7 @@ fn large_scans_to_slow_clients() {
         let whole = daemon.get(&path);
         assert_eq!(whole.status, 200);
         assert_eq!(whole.json()["pings"].as_array().map(Vec::len), Some(MANY_BEAMS as usize));
-        let late_ms = late_ms.join().expect("no panic");
-        over.store(true, Ordering::Relaxed);
-        late_ms
+        late_ms.join().expect("no panic")
     });
     late_ms.sort_by(f64::total_cmp);
     let late = late_ms[late_ms.len() * 95 / 100];

@@ -13,6 +13,7 @@ use std::{
     env, fs,
     path::{Path, PathBuf},
     process::{Child, Command, Output, Stdio},
+    sync::atomic::{AtomicBool, Ordering},
     time::{Duration, Instant},
 };
 
@@ -174,11 +175,20 @@ pub fn interrupt(process: u32) {
     kill_process(pid, Signal::INT).expect("it runs");
 }
 
-/// Waits up to 20 s for a condition.
+/// Sets a flag when it is dropped, by a panic too: threads of a scope that test the flag end.
+pub struct SetOnDrop<'a>(pub &'a AtomicBool);
+
+impl Drop for SetOnDrop<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Waits up to a minute for a condition: a busy machine takes long.
 pub fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
     let since = Instant::now();
     while !condition() {
-        assert!(since.elapsed() < Duration::from_secs(20), "waited in vain for {what}");
+        assert!(since.elapsed() < Duration::from_secs(60), "waited in vain for {what}");
         std::thread::sleep(Duration::from_millis(10));
     }
 }
