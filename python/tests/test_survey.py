@@ -54,6 +54,18 @@ def test_reconstructs_room(found: sonard.Survey) -> None:
     assert both.sum() > 200 and (np.abs(true[both] - again[both]) < 0.005).mean() > 0.95
 
 
+def test_finds_a_post() -> None:
+    corners = [[0.0, 0.0], [2.8, 0.0], [2.8, 2.3], [0.0, 2.3]]
+    room = sonard.Scene.from_points(corners, cylinders=[[2.1, 0.6, 0.06]])
+    stops = np.vstack([STOPS, [1.4, 1.6, 190.0]])
+    found = sonard.survey(sonard.Model(room, max_range_m=4.0).predict(stops), stops, max_range_m=4.0)
+    (post,) = found.posts
+    assert post.status == "observed" and post.sweeps >= 2 and post.evidence_nats > 10
+    np.testing.assert_allclose([*post.center, post.radius_m], [2.1, 0.6, 0.06], atol=0.005)
+    assert all(0 < sigma < 0.01 for sigma in (*post.sigma_m, post.sigma_radius_m))
+    np.testing.assert_allclose(found.scene.cylinders, [[*post.center, post.radius_m]], atol=1e-6)
+
+
 def test_matches_command(command: Command, tmp_path: Path) -> None:
     room = tmp_path / "truth.json"
     room.write_text(ROOM.to_json())

@@ -22,11 +22,12 @@ fn path(folder: &Path, name: &str) -> String {
     folder.join(name).to_str().expect("a plain path").to_owned()
 }
 
-/// Logs of sweeps with a millimetre of noise, whose poses drift by centimetres and degrees.
-fn sweeps(folder: &Path) -> Vec<String> {
+/// Logs of sweeps with a millimetre of noise, whose poses drift by centimetres and degrees, in a
+/// room with these cylinders.
+fn sweeps(folder: &Path, cylinders: &Value) -> Vec<String> {
     let [w, d] = SIDES_M;
     let room = serde_json::json!({
-        "name": "room", "materials": {"wall": {"reflectance": 0.97}},
+        "name": "room", "materials": {"wall": {"reflectance": 0.97}}, "cylinders": cylinders.as_array().cloned().unwrap_or_default(),
         "walls": [{"id": "wall", "polyline": [[0, 0], [w, 0], [w, d], [0, d]], "closed": true, "material": "wall"}],
     });
     let scene = path(folder, "truth.json");
@@ -66,7 +67,7 @@ fn distance_m(a: &Value, b: &Value) -> f64 {
 #[test]
 fn survey_reconstructs_room_and_course() {
     let folder = tempfile::tempdir().expect("a folder");
-    let logs = sweeps(folder.path());
+    let logs = sweeps(folder.path(), &Value::Null);
     let out = path(folder.path(), "out");
     let mut arguments = vec!["survey", "--odometry", "0.05,5", "--out", &out, "--max-range", "4"];
     arguments.extend(logs.iter().map(String::as_str));
@@ -132,9 +133,30 @@ fn survey_reconstructs_room_and_course() {
 }
 
 #[test]
+fn survey_finds_a_post() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let leg = serde_json::json!([{"id": "leg", "center": [2.1, 0.6], "radius_m": 0.06, "material": "wall"}]);
+    let logs = sweeps(folder.path(), &leg);
+    let out = path(folder.path(), "out");
+    let mut arguments = vec!["survey", "--out", &out, "--max-range", "4"];
+    arguments.extend(logs.iter().map(String::as_str));
+    let printed = succeeds(&arguments);
+    assert!(printed.starts_with("4 walls and 1 post from 4 sweeps"), "{printed}");
+    assert!(printed.lines().any(|line| line.contains("post-1") && line.contains("observed")));
+    let read = |name: &str| fs::read_to_string(format!("{out}/{name}")).expect(name);
+    assert!(read("report.md").contains("| post-1 |"));
+    let scene: Value = serde_json::from_str(&read("scene.json")).expect("JSON");
+    let [post] = &scene["cylinders"].as_array().expect("cylinders")[..] else { panic!("{scene}") };
+    let expected = serde_json::json!([2.1, 0.6]);
+    assert!(distance_m(&post["center"], &expected) < 0.01, "{post}");
+    assert!((post["radius_m"].as_f64().expect("metres") - 0.06).abs() < 0.003, "{post}");
+    succeeds(&["scene", "check", &path(Path::new(&out), "scene.json")]);
+}
+
+#[test]
 fn survey_states_what_is_missing() {
     let folder = tempfile::tempdir().expect("a folder");
-    let logs = sweeps(folder.path());
+    let logs = sweeps(folder.path(), &Value::Null);
     let out = path(folder.path(), "out");
     let rejected_at = |out: &str, arguments: &[&str], reason: &str| {
         let output = run(&[&["survey", "--out", out], arguments].concat());
@@ -173,7 +195,7 @@ fn survey_states_what_is_missing() {
 #[test]
 fn killed_survey_continues() {
     let folder = tempfile::tempdir().expect("a folder");
-    let logs = sweeps(folder.path());
+    let logs = sweeps(folder.path(), &Value::Null);
     let [killed, whole] = ["killed", "whole"].map(|name| path(folder.path(), name));
     let arguments = |out: &str| {
         let mut arguments = vec!["survey".to_owned(), "--out".to_owned(), out.to_owned()];

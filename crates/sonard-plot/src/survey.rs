@@ -10,7 +10,7 @@ use super::{
 };
 use sonard_model::geometry::{DVec2, Pose};
 
-/// Certainty of a stretch of wall.
+/// Certainty of a stretch of wall or of a post.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WallCertainty {
     /// Echoes come from it.
@@ -45,6 +45,8 @@ pub struct SurveyView<'a> {
     pub badge: Option<&'static str>,
     /// Stretches of walls, metres.
     pub walls: &'a [(WallCertainty, [DVec2; 2])],
+    /// Posts by certainty, centre and radius, metres.
+    pub posts: &'a [(WallCertainty, DVec2, f64)],
     /// Corners with the radius of their 95 % interval, metres.
     pub corners: &'a [(DVec2, f64)],
     /// Poses in the order of the course.
@@ -54,9 +56,9 @@ pub struct SurveyView<'a> {
 }
 
 const WALLS: [(WallCertainty, &str, &str, f64, &str); 3] = [
-    (WallCertainty::Observed, "observed wall", theme::WALL, 3.2, "none"),
+    (WallCertainty::Observed, "observed wall or post", theme::WALL, 3.2, "none"),
     (WallCertainty::Implied, "implied wall", theme::BLUE, 2.4, "9 3"),
-    (WallCertainty::Conjectured, "conjectured wall", theme::FRAME, 2.0, "1.5 3"),
+    (WallCertainty::Conjectured, "conjectured wall or post", theme::FRAME, 2.0, "1.5 3"),
 ];
 const ECHOES: [(EchoCause, &str, &str, MarkShape); 4] = [
     (EchoCause::First, "echo by one reflection", theme::GREEN, MarkShape::Dot),
@@ -99,8 +101,9 @@ pub fn draw_survey(view: &SurveyView) -> Picture {
 
 fn region(view: &SurveyView) -> Bounds {
     let ends = view.walls.iter().flat_map(|(_, ends)| *ends);
+    let posts = view.posts.iter().map(|(_, center, _)| *center);
     let places = view.poses.iter().map(Pose::position);
-    let around = Bounds::around(ends.chain(places).filter(|at| at.is_finite()));
+    let around = Bounds::around(ends.chain(posts).chain(places).filter(|at| at.is_finite()));
     let nothing = Bounds { min: DVec2::ZERO, max: DVec2::ONE };
     around.unwrap_or(nothing).grown(AROUND_M)
 }
@@ -115,7 +118,10 @@ fn enlargement(view: &SurveyView, plan: &PlanProjection) -> f64 {
 }
 
 fn entries(view: &SurveyView, factor: f64) -> Vec<LegendEntry> {
-    let has_wall = |certainty| view.walls.iter().any(|(of, _)| *of == certainty);
+    let has_wall = |certainty| {
+        view.walls.iter().any(|(of, _)| *of == certainty)
+            || view.posts.iter().any(|(of, ..)| *of == certainty)
+    };
     let has_echo = |cause| view.echoes.iter().any(|(_, of)| *of == cause);
     let walls = WALLS.into_iter().filter(|(certainty, ..)| has_wall(*certainty));
     let walls = walls.map(|(_, name, colour, width_px, dash)| {
@@ -144,6 +150,9 @@ fn walls(view: &SurveyView, plan: &PlanProjection) -> Layer {
         layer = layer.with("stroke-dasharray", dash);
         for (_, [a, b]) in view.walls.iter().filter(|(of, _)| *of == certainty) {
             layer.line(plan.px(*a), plan.px(*b));
+        }
+        for (_, center, radius_m) in view.posts.iter().filter(|(of, ..)| *of == certainty) {
+            layer.circle(plan.px(*center), plan.length_px(*radius_m));
         }
         all.add(layer);
     }
@@ -202,6 +211,7 @@ mod tests {
                 lines: Vec::new(),
                 badge: None,
                 walls: &walls,
+                posts: &[],
                 corners: &corners,
                 poses: &[pose],
                 echoes: &[(DVec2::new(1.0, 3.0), EchoCause::First)],

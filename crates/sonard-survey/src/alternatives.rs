@@ -182,7 +182,7 @@ fn is_same(a: &[Segment], b: &[Segment]) -> bool {
 
 fn is_covered(wall: &Segment, others: &[Segment]) -> bool {
     const STEP_M: f64 = 0.05;
-    let count = (wall.a.distance(wall.b) / STEP_M).ceil().max(1.0) as usize;
+    let count = (wall.length_m() / STEP_M).ceil().max(1.0) as usize;
     let is_near = |point: DVec2| {
         others.iter().any(|other| {
             sonard_model::geometry::distance_to_segment(point, other.a, other.b) < SAME_M

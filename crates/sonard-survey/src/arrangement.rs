@@ -57,6 +57,13 @@ pub(crate) struct Segment {
     pub(crate) b: DVec2,
 }
 
+impl Segment {
+    /// Length, metres.
+    pub(crate) fn length_m(&self) -> f64 {
+        self.a.distance(self.b)
+    }
+}
+
 impl PieceSet {
     pub(crate) fn new(pieces: usize) -> Self {
         Self { words: vec![0; pieces.div_ceil(64)] }
@@ -208,7 +215,7 @@ impl LineArrangement {
                 }
                 let run = Run { line, first, last: at - 1 };
                 let segment = self.segment(&run);
-                if segment.a.distance(segment.b) > MIN_WALL_M {
+                if segment.length_m() > MIN_WALL_M {
                     runs.push(run);
                 }
             }

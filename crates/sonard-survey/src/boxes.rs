@@ -57,14 +57,13 @@ pub(crate) fn with_box(posed: &PosedPlan, judge: &Judge, left: &[&Arc]) -> Optio
 
 /// Faces with a depth of 0: short walls with a free end, the longest first, and unexplained arcs.
 fn faces(posed: &PosedPlan, walls: &[Segment], left: &[&Arc]) -> Vec<BoxShape> {
-    let length_m = |wall: &Segment| wall.a.distance(wall.b);
     let mut short: Vec<&Segment> = walls
         .iter()
         .enumerate()
-        .filter(|(at, wall)| length_m(wall) < SIDE_M[1] && free_ends(walls, *at) > 0)
+        .filter(|(at, wall)| wall.length_m() < SIDE_M[1] && free_ends(walls, *at) > 0)
         .map(|(_, wall)| wall)
         .collect();
-    short.sort_by(|a, b| length_m(b).total_cmp(&length_m(a)));
+    short.sort_by(|a, b| b.length_m().total_cmp(&a.length_m()));
     let of_walls = short.into_iter().map(|wall| {
         let face = posed.plan.lines[wall.line].clone();
         let [from_m, to_m] = [wall.a, wall.b].map(|end| face.along_m(end));
@@ -84,8 +83,7 @@ fn faces(posed: &PosedPlan, walls: &[Segment], left: &[&Arc]) -> Vec<BoxShape> {
 
 /// Likeliest box behind a face, on either side of it.
 fn grown(face: &BoxShape, walls: &[Segment], judge: &Judge) -> Option<(f64, BoxShape)> {
-    let rough =
-        Judge::new(judge.workspace, &judge.poses, judge.workspace.errors.sigma_m(ROUGH_SIGMA_M));
+    let rough = judge.with_sigma(judge.workspace.errors.sigma_m(ROUGH_SIGMA_M));
     let count = ((SIDE_M[1] - SIDE_M[0]) / STEP_M) as i32;
     let depth = |at: i32| {
         let depth_m = SIDE_M[0] + STEP_M * f64::from(at.abs() - 1);
@@ -131,7 +129,7 @@ fn fine(from: BoxShape, walls: &[Segment], judge: &Judge) -> (f64, BoxShape) {
     let mut best = from;
     let mut score = f64::NEG_INFINITY;
     for step_m in FINE_M {
-        let own = Judge::new(judge.workspace, &judge.poses, judge.sigma_m.max(0.5 * step_m));
+        let own = judge.with_sigma(judge.sigma_m.max(0.5 * step_m));
         score = score_of(&best, walls, &own).unwrap_or(f64::NEG_INFINITY);
         for _ in 0..6 {
             let moved = (0..6).map(|at| {
@@ -229,5 +227,5 @@ fn built(posed: &PosedPlan, walls: &[Segment], shape: &BoxShape, reach_m: f64) -
     }
     let plan = LineArrangement::new(lines, &posed.poses, reach_m);
     let walls = plan.of_segments(&all);
-    PosedPlan { plan, walls, poses: posed.poses.clone() }
+    PosedPlan { plan, walls, posts: posed.posts.clone(), poses: posed.poses.clone() }
 }

@@ -1,4 +1,5 @@
-//! Score of a plan: likelihood of all readings by the exact model, less the price of its walls.
+//! Score of a plan: likelihood of all readings by the exact model, less the price of its walls and
+//! posts.
 
 use std::{
     collections::HashMap,
@@ -11,11 +12,13 @@ use sonard_model::{
     geometry::{Pose, wrap_180, wrap_360},
     model::{Prediction, Simulator},
     reading::PingStatus,
-    scene::{Material, Scene, Wall},
+    scene::{Cylinder, Material, Scene, Wall},
 };
 
 use crate::{
     arrangement::{LineArrangement, PieceSet, Segment, free_ends},
+    posed::PosedPlan,
+    posts::{self, PostShape},
     readings::{Beam, Outcome, Readings},
     square::oblique_price,
     workspace::Workspace,
@@ -31,6 +34,9 @@ const WALL_NATS: f64 = 4.0;
 const FREE_END_NATS: f64 = 2.0;
 /// Price of the length of walls, nats per metre.
 const LENGTH_NATS_PER_M: f64 = 0.5;
+/// Price of a post, nats: that of a wall and, for each of its three numbers, half that of a line,
+/// which has two. A single arc that it explains gains about as much.
+pub(crate) const POST_NATS: f64 = 10.0;
 /// Step of directions in which readings are predicted for all headings, degrees: at most half of
 /// the step of a coarse ranger's beams.
 const DIRECTION_STEP_DEG: f64 = 1.5;
@@ -47,6 +53,8 @@ pub(crate) type Predictions = Vec<Vec<Prediction>>;
 pub(crate) struct Judge<'a> {
     pub(crate) workspace: &'a Workspace<'a>,
     pub(crate) poses: Vec<Pose>,
+    /// Posts of all plans scored.
+    pub(crate) posts: Vec<PostShape>,
     /// Standard deviation of ranges, metres.
     pub(crate) sigma_m: f64,
     /// Maximum log-likelihood of the readings of each sweep, nats.
@@ -72,8 +80,31 @@ impl<'a> Judge<'a> {
             sweep_nats(readings, measured, sigma_m, workspace.reach_m())
         };
         let max_nats = workspace.readings.iter().map(of_sweep).collect();
-        let (poses, known) = (poses.to_vec(), Mutex::default());
-        Self { workspace, poses, sigma_m, max_nats, are_headings_free: false, known }
+        let (poses, posts, known) = (poses.to_vec(), Vec::new(), Mutex::default());
+        Self { workspace, poses, posts, sigma_m, max_nats, are_headings_free: false, known }
+    }
+
+    /// Judge of plans with the poses and posts of one.
+    pub(crate) fn of(workspace: &'a Workspace<'a>, posed: &PosedPlan, sigma_m: f64) -> Self {
+        Self { posts: posed.posts.clone(), ..Self::new(workspace, &posed.poses, sigma_m) }
+    }
+
+    /// Judge from the poses and with the posts of another plan.
+    pub(crate) fn at(&self, posed: &PosedPlan) -> Self {
+        Self::of(self.workspace, posed, self.sigma_m)
+    }
+
+    /// Judge with another standard deviation of ranges, metres.
+    pub(crate) fn with_sigma(&self, sigma_m: f64) -> Self {
+        let posts = self.posts.clone();
+        Self { posts, ..Self::new(self.workspace, &self.poses, sigma_m) }
+    }
+
+    /// Judge of plans with other posts.
+    pub(crate) fn with_posts(&self, posts: &[PostShape]) -> Self {
+        let (poses, max_nats) = (self.poses.clone(), self.max_nats.clone());
+        let (posts, known) = (posts.to_vec(), Mutex::default());
+        Self { poses, posts, max_nats, known, ..*self }
     }
 
     /// Judge that scores each plan with the likeliest headings of all sweeps but the first.
@@ -92,11 +123,6 @@ impl<'a> Judge<'a> {
             Some(Pose { heading_deg: wrap_180(pose.heading_deg + by_deg), ..*pose })
         };
         self.poses.iter().enumerate().map(turned).collect()
-    }
-
-    /// Judge from other poses.
-    pub(crate) fn at_poses(&self, poses: &[Pose]) -> Self {
-        Self::new(self.workspace, poses, self.sigma_m)
     }
 
     /// Readings of all sweeps.
@@ -140,7 +166,8 @@ impl<'a> Judge<'a> {
 
     /// Score, or an upper bound of it that does not exceed `floor`, nats.
     fn score_segments_above(&self, segments: &[Segment], floor: f64) -> Result<f64, f64> {
-        let (price, oblique) = (price(segments), self.oblique_nats(segments));
+        let price = price(segments) + posts::price(&self.posts);
+        let oblique = self.oblique_nats(segments);
         let priced = |nats: f64| nats - price - oblique;
         let nats = self.log_likelihood_above(segments, floor + price + oblique);
         nats.map(priced).map_err(priced)
@@ -179,17 +206,10 @@ impl<'a> Judge<'a> {
         self.workspace.scores.get_or(digest, sum)
     }
 
-    /// Digest of walls, poses, standard deviation of ranges and freedom of headings.
+    /// Digest of walls, posts, poses, standard deviation of ranges and freedom of headings.
     fn digest(&self, segments: &[Segment]) -> u64 {
-        let mut hasher = DefaultHasher::new();
-        segments.len().hash(&mut hasher);
-        let ends = segments.iter().flat_map(|wall| [wall.a.to_array(), wall.b.to_array()]);
-        let poses = self.poses.iter().flat_map(|pose| [pose.x_m, pose.y_m, pose.heading_deg]);
-        for value in ends.flatten().chain(poses).chain([self.sigma_m]) {
-            value.to_bits().hash(&mut hasher);
-        }
-        self.are_headings_free.hash(&mut hasher);
-        hasher.finish()
+        let of_plan = plan_digest(segments, &self.posts, &self.poses, self.sigma_m);
+        if self.are_headings_free { of_plan.rotate_left(1) ^ 1 } else { of_plan }
     }
 
     /// Log-likelihood of the readings of a sweep and of its odometry at the likeliest heading, nats,
@@ -241,9 +261,9 @@ impl<'a> Judge<'a> {
         Some(sweep_nats(readings, predicted, self.sigma_m, self.workspace.reach_m()))
     }
 
-    /// Scene with these walls, in their order.
+    /// Scene with these walls and the posts, in their order.
     pub(crate) fn scene_of(&self, segments: &[Segment]) -> Scene {
-        scene_of(self.workspace.simulator.scene(), segments)
+        scene_of(self.workspace.simulator.scene(), segments, &self.posts)
     }
 
     /// Simulator of a scene with these walls.
@@ -261,8 +281,21 @@ impl<'a> Judge<'a> {
     }
 }
 
-/// Scene with walls of the first material of a template; walls keep their index.
-fn scene_of(template: &Scene, segments: &[Segment]) -> Scene {
+/// Digest of walls, posts, poses and standard deviation of ranges in metres.
+fn plan_digest(segments: &[Segment], posts: &[PostShape], poses: &[Pose], sigma_m: f64) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    segments.len().hash(&mut hasher);
+    let ends = segments.iter().flat_map(|wall| [wall.a.to_array(), wall.b.to_array()]);
+    let poses = poses.iter().flat_map(|pose| [pose.x_m, pose.y_m, pose.heading_deg]);
+    let posts = posts.iter().flat_map(|post| [post.center.x, post.center.y, post.radius_m]);
+    for value in ends.flatten().chain(poses).chain([sigma_m]).chain(posts) {
+        value.to_bits().hash(&mut hasher);
+    }
+    hasher.finish()
+}
+
+/// Scene with walls and posts of the first material of a template; both keep their index.
+fn scene_of(template: &Scene, segments: &[Segment], posts: &[PostShape]) -> Scene {
     let material = template.materials.values().next().copied().unwrap_or(Material::RIGID);
     let wall = |(at, segment): (usize, &Segment)| Wall {
         id: format!("wall-{at}").into(),
@@ -273,6 +306,14 @@ fn scene_of(template: &Scene, segments: &[Segment]) -> Scene {
     };
     let mut scene = template.clone();
     scene.walls = segments.iter().enumerate().map(wall).collect();
+    let post = |(at, post): (usize, &PostShape)| Cylinder {
+        id: format!("post-{at}").into(),
+        center: post.center,
+        radius_m: post.radius_m,
+        material,
+        z_m: None,
+    };
+    scene.cylinders = posts.iter().enumerate().map(post).collect();
     scene
 }
 
@@ -342,7 +383,7 @@ pub(crate) fn price(segments: &[Segment]) -> f64 {
     let mut lines: Vec<usize> = segments.iter().map(|segment| segment.line).collect();
     lines.sort_unstable();
     lines.dedup();
-    let length_m: f64 = segments.iter().map(|segment| segment.a.distance(segment.b)).sum();
+    let length_m: f64 = segments.iter().map(|segment| segment.length_m()).sum();
     let free: usize = (0..segments.len()).map(|at| free_ends(segments, at)).sum();
     LINE_NATS * lines.len() as f64
         + WALL_NATS * segments.len() as f64

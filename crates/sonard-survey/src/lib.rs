@@ -7,8 +7,8 @@
 //!    point, so multiple reflections are landmarks without an interpretation of their paths.
 //! 2. Lines through these features are cut at each other. Which pieces are walls is decided by the
 //!    likelihood of all readings under the exact model of `sonard_model`, less a price for walls.
-//! 3. Poses and lines are refined together with the paths of all explained arcs, and lines are
-//!    added where arcs remain unexplained.
+//! 3. Poses and lines are refined together with the paths of all explained arcs, and lines, posts
+//!    and boxes are added where arcs remain unexplained.
 //!
 //! [`map_course`] does the first step alone, for courses without a scene.
 
@@ -32,6 +32,7 @@ mod options;
 mod polish;
 mod pose_grid;
 mod posed;
+mod posts;
 mod progress;
 mod range_errors;
 mod readings;
@@ -58,10 +59,11 @@ pub use error::SurveyError;
 pub use feature::VirtualFeature;
 pub use odometry::OdometrySigma;
 pub use options::SurveyOptions;
+pub use posts::PostShape;
 pub use progress::{NoObserver, SurveyObserver, SurveyProgress, SurveyStage};
 pub use result::{
     AlternativePlan, PieceStatus, ReadingCause, SearchEnd, Survey, SurveyedEnd, SurveyedPose,
-    SurveyedWall, UnexplainedArc, WallPiece,
+    SurveyedPost, SurveyedWall, UnexplainedArc, WallPiece,
 };
 pub use room::unknown_room;
 pub use scores::PlanScores;

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use sonard_inverse::{ErrorModel, Hypotheses, LogLikelihood, Parameter};
+use sonard_inverse::{ErrorModel, Hypotheses, LogLikelihood, Parameter, PostPart};
 
 use crate::{
     arc::{Arc, quantile},
@@ -28,7 +28,7 @@ struct Linearized {
     normal: NormalEquations,
 }
 
-/// Improves poses and lines by the likelihood of all readings: ranges, missing echoes and the ends
+/// Improves poses, lines and posts by the likelihood of all readings: ranges, missing echoes and the ends
 /// of arcs. Directions are tied to a square axis if the survey assumes one. Returns `None` if the
 /// normal equations have no solution.
 pub(crate) fn polish(posed: &mut PosedPlan, judge: &Judge) -> Option<()> {
@@ -85,7 +85,7 @@ fn error_model(posed: &PosedPlan, judge: &Judge) -> Option<ErrorModel> {
 fn absolute_errors_m(posed: &PosedPlan, judge: &Judge) -> Option<Vec<f64>> {
     const GATE_M: f64 = 0.03;
     let gate_m = judge.workspace.errors.gate_m(GATE_M);
-    let own = judge.at_poses(&posed.poses);
+    let own = judge.at(posed);
     let (_, predictions) = own.predictions(&posed.plan.segments(&posed.walls))?;
     let of_arc = |arc: &Arc| {
         let (readings, predictions) = (&own.readings()[arc.sweep], &predictions[arc.sweep]);
@@ -101,10 +101,13 @@ fn linearize(posed: &PosedPlan, judge: &Judge, errors: &ErrorModel) -> Option<Li
     let workspace = judge.workspace;
     let segments = posed.plan.segments(&posed.walls);
     let mut world = workspace.world.clone();
-    world.scene = std::sync::Arc::new(judge.scene_of(&segments));
+    world.scene = std::sync::Arc::new(judge.at(posed).scene_of(&segments));
     let mut parameters = vec![Parameter::X(0), Parameter::Y(0), Parameter::Heading(0)];
     parameters.extend((0..segments.len()).map(Parameter::Wall));
     parameters.extend((0..segments.len()).map(Parameter::WallTurn));
+    let parts = [PostPart::X, PostPart::Y, PostPart::Radius];
+    let of_post = |post: usize| parts.map(|part| Parameter::Post(post, part));
+    parameters.extend((0..posed.posts.len()).flat_map(of_post));
     let hypotheses = Hypotheses::new(world, parameters).ok()?;
     let of_sweep = |(sweep, pose)| hypotheses.log_likelihood(sweep, pose, errors).ok();
     let pairs = workspace.sweeps.par_iter().zip(&posed.poses);
@@ -131,8 +134,8 @@ fn linearize(posed: &PosedPlan, judge: &Judge, errors: &ErrorModel) -> Option<Li
     Some(Linearized { value, normal })
 }
 
-/// Derivatives of the parameters of a sweep (its pose, the offsets of all walls, their turns) by
-/// columns of the normal equations.
+/// Derivatives of the parameters of a sweep (its pose, the offsets of all walls, their turns, the
+/// posts) by columns of the normal equations.
 ///
 /// Headings and turns are in degrees there and in radians here. The normal of a wall points to its
 /// left, against that of its line, and a wall turns about its middle, a line about the foot of the
@@ -153,7 +156,8 @@ fn parameter_columns(
     let turn = |wall: &Segment| columns.of(wall.line).map(|at| (at, to_deg));
     let of_pose = of_pose.into_iter().map(|of| of.into_iter().collect());
     let turns = segments.iter().map(|wall| turn(wall).into_iter().collect());
-    of_pose.chain(segments.iter().map(offset)).chain(turns).collect()
+    let of_posts = (columns.of_post(0)..columns.count()).map(|at| vec![(at, 1.0)]);
+    of_pose.chain(segments.iter().map(offset)).chain(turns).chain(of_posts).collect()
 }
 
 /// Adds a gradient and an information matrix whose parameters depend linearly on columns.
@@ -194,5 +198,10 @@ fn moved(posed: &PosedPlan, step: &DVector<f64>, judge: &Judge) -> PosedPlan {
     }
     let reach_m = judge.workspace.reach_m();
     let (plan, walls) = posed.plan.rebuilt(&posed.walls, lines, &poses, reach_m);
-    PosedPlan { plan, walls, poses }
+    let mut posts = posed.posts.clone();
+    for (number, post) in posts.iter_mut().enumerate() {
+        let at = columns.of_post(number);
+        *post = post.moved([0, 1, 2].map(|offset| step[at + offset]));
+    }
+    PosedPlan { plan, walls, posts, poses }
 }

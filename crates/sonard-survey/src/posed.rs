@@ -3,9 +3,10 @@
 use sonard_model::geometry::Pose;
 
 use crate::{
-    arrangement::{LineArrangement, PieceSet},
+    arrangement::{LineArrangement, PieceSet, Run},
     line::{off_square_rad, square_axis},
     normal::NormalEquations,
+    posts::PostShape,
     square::MAX_OFF_RAD,
 };
 
@@ -14,6 +15,7 @@ use crate::{
 pub(crate) struct PosedPlan {
     pub(crate) plan: LineArrangement,
     pub(crate) walls: PieceSet,
+    pub(crate) posts: Vec<PostShape>,
     pub(crate) poses: Vec<Pose>,
 }
 
@@ -21,15 +23,34 @@ impl PosedPlan {
     /// Poses without lines and walls.
     pub(crate) fn without_walls(poses: Vec<Pose>) -> Self {
         let plan = LineArrangement::new(Vec::new(), &poses, 0.0);
-        Self { plan, walls: PieceSet::default(), poses }
+        Self { plan, walls: PieceSet::default(), posts: Vec::new(), poses }
+    }
+
+    /// Plan without walls shorter than `max_m` metres.
+    pub(crate) fn without_short_walls(&self, max_m: f64) -> Self {
+        let mut fewer = self.clone();
+        for run in self.plan.runs(&self.walls) {
+            if self.plan.segment(&run).length_m() < max_m {
+                fewer.set_run(&run, false);
+            }
+        }
+        fewer
+    }
+
+    /// Adds or removes the pieces of a run.
+    pub(crate) fn set_run(&mut self, run: &Run, is_wall: bool) {
+        for at in run.first..=run.last {
+            self.walls.set(self.plan.piece(run.line, at), is_wall);
+        }
     }
 }
 
 /// Columns of the lines with walls in normal equations, after those of the poses: direction, then
-/// distance.
+/// distance; last those of the posts: x and y of the centre, then radius.
 #[derive(Debug, Clone)]
 pub(crate) struct LineColumns {
     lines: Vec<Option<usize>>,
+    first_post: usize,
     count: usize,
 }
 
@@ -43,7 +64,7 @@ impl LineColumns {
                 count - 2
             });
         }
-        Self { lines, count }
+        Self { lines, first_post: count, count: count + 3 * posed.posts.len() }
     }
 
     /// Number of columns in all.
@@ -54,6 +75,11 @@ impl LineColumns {
     /// Column of the direction of a line; `None` without walls on it.
     pub(crate) fn of(&self, line: usize) -> Option<usize> {
         self.lines.get(line).copied().flatten()
+    }
+
+    /// Column of the x of a post.
+    pub(crate) const fn of_post(&self, post: usize) -> usize {
+        self.first_post + 3 * post
     }
 
     /// Column of the direction of each line.

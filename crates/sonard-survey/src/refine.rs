@@ -1,4 +1,4 @@
-//! Joint estimate of poses and lines from the arcs that a plan explains, of any order.
+//! Joint estimate of poses, lines and posts from the arcs that a plan explains, of any order.
 
 use sonard_model::geometry::wrap_180;
 
@@ -19,7 +19,7 @@ const PRIOR: [f64; 3] = [0.1, 0.052, 0.087];
 /// Maximum change of a step in the same order.
 const MAX_STEP: [f64; 3] = [0.02, 0.017, 0.026];
 
-/// Improves poses and lines together as far as the likelihood gains, and returns the covariance.
+/// Improves poses, lines and posts together as far as the likelihood gains, and returns the covariance.
 /// Ranges that differ by more than `gate_m` do not belong together.
 pub(crate) fn refine(
     posed: &mut PosedPlan,
@@ -28,7 +28,7 @@ pub(crate) fn refine(
     steps: usize,
 ) -> Option<PlanCovariance> {
     const SHARES: [f64; 3] = [1.0, 0.5, 0.2];
-    let mut best = judge.score_segments(&posed.plan.segments(&posed.walls));
+    let mut best = judge.at(posed).score_segments(&posed.plan.segments(&posed.walls));
     for _ in 0..2 {
         let mut far = posed.clone();
         for _ in 0..steps {
@@ -39,7 +39,7 @@ pub(crate) fn refine(
         let mut is_better = false;
         for share in SHARES {
             let tried = between(posed, &far, share, judge.workspace.reach_m());
-            let own = judge.at_poses(&tried.poses);
+            let own = judge.at(&tried);
             let score = own.score_segments(&tried.plan.segments(&tried.walls));
             if score > best + 0.05 {
                 (*posed, best, is_better) = (tried, score, true);
@@ -71,7 +71,12 @@ fn between(from: &PosedPlan, to: &PosedPlan, share: f64, reach_m: f64) -> PosedP
         line.update_feet(&poses);
     }
     let (plan, walls) = from.plan.rebuilt(&from.walls, lines, &poses, reach_m);
-    PosedPlan { plan, walls, poses }
+    let mut posts = from.posts.clone();
+    for (post, far) in posts.iter_mut().zip(&to.posts) {
+        let by = share * (far.center - post.center);
+        *post = post.moved([by.x, by.y, share * (far.radius_m - post.radius_m)]);
+    }
+    PosedPlan { plan, walls, posts, poses }
 }
 
 /// Makes a step of Gauss and Newton.
@@ -88,13 +93,18 @@ fn step(posed: &mut PosedPlan, judge: &Judge, gate_m: f64) -> Option<()> {
         normal.hold(at, PRIOR[1]);
         normal.hold(at + 1, PRIOR[0]);
     }
+    for post in 0..posed.posts.len() {
+        (0..3).for_each(|offset| normal.hold(columns.of_post(post) + offset, PRIOR[0]));
+    }
     let step = normal.step(0.0)?;
     let mut excess: f64 = 1.0;
     let of_poses = 3 * (posed.poses.len() - 1);
+    let first_post = columns.of_post(0);
     for (at, by) in step.iter().enumerate() {
         let max = match (at < of_poses, at % 3, (at.max(of_poses) - of_poses) % 2) {
             (true, 2, _) => MAX_STEP[2],
             (true, ..) | (false, _, 1) => MAX_STEP[0],
+            (false, ..) if at >= first_post => MAX_STEP[0],
             (false, ..) => MAX_STEP[1],
         };
         excess = excess.max(by.abs() / max);
@@ -103,6 +113,10 @@ fn step(posed: &mut PosedPlan, judge: &Judge, gate_m: f64) -> Option<()> {
     for (at, pose) in posed.poses.iter_mut().enumerate().skip(1) {
         let at = pose_column(at)?;
         move_pose(pose, [step[at], step[at + 1], step[at + 2]]);
+    }
+    for (number, post) in posed.posts.iter_mut().enumerate() {
+        let at = columns.of_post(number);
+        *post = post.moved([step[at], step[at + 1], step[at + 2]]);
     }
     let mut lines = posed.plan.lines.clone();
     for (line, at) in lines.iter_mut().zip(columns.lines()) {
@@ -124,7 +138,7 @@ fn equations(
     judge: &Judge,
     gate_m: f64,
 ) -> Option<NormalEquations> {
-    let own = judge.at_poses(&posed.poses);
+    let own = judge.at(posed);
     let (simulator, predictions) = own.predictions(&posed.plan.segments(&posed.walls))?;
     let runs = posed.plan.runs(&posed.walls);
     let rows = RowBuilder::new(posed, columns, (&simulator, judge.workspace.errors), &runs);

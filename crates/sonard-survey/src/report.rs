@@ -1,24 +1,34 @@
 //! Result of a survey from its final plan.
 
+use std::collections::BTreeSet;
+
 use sonard_inverse::FitSweep;
 use sonard_model::{model::Prediction, reading::PathKind};
 
 use crate::{
-    alternatives::{Assessment, JudgedWall},
+    alternatives::{Assessment, JudgedWall, LISTED_NATS},
     arrangement::LineArrangement,
     covariance::PlanCovariance,
-    judge::{Judge, outcome_of},
+    judge::{Judge, Predictions, outcome_of},
     options::SurveyOptions,
     posed::PosedPlan,
+    posts::evidence_nats,
     readings::{Beam, Outcome},
     result::{
-        AlternativePlan, ReadingCause, SearchEnd, Survey, SurveyedEnd, SurveyedPose, SurveyedWall,
-        UnexplainedArc,
+        AlternativePlan, PieceStatus, ReadingCause, SearchEnd, Survey, SurveyedEnd, SurveyedPose,
+        SurveyedPost, SurveyedWall, UnexplainedArc,
     },
+    rows::direct_post,
+    spots::consistent_arcs,
     symmetry::equivalent_poses,
     trace::unexplained,
     workspace::Workspace,
 };
+
+/// Minimum number of sweeps whose direct echoes determine a post.
+const MIN_POST_SWEEPS: usize = 2;
+/// Standard deviation of centre and radius up to which a post is determined, metres.
+const MAX_POST_SIGMA_M: f64 = 0.01;
 
 pub(crate) fn report(
     sweeps: &[FitSweep],
@@ -28,7 +38,7 @@ pub(crate) fn report(
     workspace: &Workspace,
     (end, options): (SearchEnd, &SurveyOptions),
 ) -> Survey {
-    let judge = Judge::new(workspace, &posed.poses, workspace.errors.final_sigma_m());
+    let judge = Judge::of(workspace, posed, workspace.errors.final_sigma_m());
     let explained_m = workspace.errors.explained_m();
     let score = judge.score(&posed.plan, &posed.walls);
     let predictions = judge.predictions(&posed.plan.segments(&posed.walls));
@@ -48,6 +58,7 @@ pub(crate) fn report(
     let covariance = covariance.as_ref();
     let equivalent = equivalent_poses(posed, &judge);
     let (alternatives, probability) = weighted(assessment);
+    let posts = surveyed_posts(posed, &judge, &predictions, covariance);
     Survey {
         walls: assessment
             .walls
@@ -55,6 +66,7 @@ pub(crate) fn report(
             .enumerate()
             .map(|(at, wall)| surveyed(at, wall, &posed.plan, covariance))
             .collect(),
+        posts,
         poses: sweeps
             .iter()
             .zip(equivalent)
@@ -126,6 +138,44 @@ fn surveyed(
         evidence_nats: wall.evidence_nats,
         pieces: wall.pieces.clone(),
     }
+}
+
+/// Posts with their status: observed if direct echoes from two sweeps or more determine it and the
+/// plan without it scores more than 10 nats worse.
+fn surveyed_posts(
+    posed: &PosedPlan,
+    judge: &Judge,
+    predictions: &Predictions,
+    covariance: Option<&PlanCovariance>,
+) -> Vec<SurveyedPost> {
+    let explained = match predictions.is_empty() {
+        true => Vec::new(),
+        false => consistent_arcs(judge, predictions).unwrap_or_default(),
+    };
+    let sweeps_of = |post: usize| {
+        let own = explained.iter().filter(|of| of.path().and_then(direct_post) == Some(post));
+        own.map(|of| of.arc.sweep).collect::<BTreeSet<usize>>().len()
+    };
+    let surveyed = |(at, evidence_nats): (usize, f64)| {
+        let sigma = covariance.filter(|of| of.has_post(at)).map(|of| of.post_sigma(at));
+        let sweeps = sweeps_of(at);
+        let is_determined = sigma.is_some_and(|of| of.iter().all(|m| *m < MAX_POST_SIGMA_M));
+        let is_observed = sweeps >= MIN_POST_SWEEPS && is_determined && evidence_nats > LISTED_NATS;
+        SurveyedPost {
+            id: format!("post-{}", at + 1),
+            center_m: posed.posts[at].center.to_array(),
+            radius_m: posed.posts[at].radius_m,
+            sigma_m: sigma.map(|[x, y, _]| [x, y]),
+            sigma_radius_m: sigma.map(|[.., radius]| radius),
+            evidence_nats,
+            sweeps,
+            status: match is_observed {
+                true => PieceStatus::Observed,
+                false => PieceStatus::Conjectured,
+            },
+        }
+    };
+    evidence_nats(posed, judge).into_iter().enumerate().map(surveyed).collect()
 }
 
 fn cause(beam: &Beam, prediction: &Prediction, explained_m: f64) -> ReadingCause {

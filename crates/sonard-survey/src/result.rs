@@ -13,10 +13,13 @@ use uuid::Uuid;
 pub struct Survey {
     /// Walls of the best plan, in the frame of the first sweep's pose.
     pub walls: Vec<SurveyedWall>,
+    /// Posts of the best plan, in the same frame.
+    #[serde(default)]
+    pub posts: Vec<SurveyedPost>,
     /// Poses of the sweeps, in their order.
     pub poses: Vec<SurveyedPose>,
     /// Score of the plan, nats: log-likelihood of the readings, those of an arc as one, less the
-    /// price of the walls.
+    /// price of walls and posts.
     pub score: f64,
     /// Part of that price for directions off right angles, nats; 0 without that assumption.
     pub oblique_nats: f64,
@@ -55,6 +58,27 @@ pub struct SurveyedWall {
     pub evidence_nats: f64,
     /// Stretches by status, from the first end to the second.
     pub pieces: Vec<WallPiece>,
+}
+
+/// Post of a plan: an upright cylinder, such as a table leg.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SurveyedPost {
+    /// Name in the scene.
+    pub id: String,
+    /// Axis, metres.
+    pub center_m: [f64; 2],
+    /// Radius, metres.
+    pub radius_m: f64,
+    /// Standard deviations of x and y of the axis, metres.
+    pub sigma_m: Option<[f64; 2]>,
+    /// Standard deviation of the radius, metres.
+    pub sigma_radius_m: Option<f64>,
+    /// Loss of score without the post, nats.
+    pub evidence_nats: f64,
+    /// Number of sweeps with a direct echo of the post.
+    pub sweeps: usize,
+    /// Observed, or conjectured and not in the scene.
+    pub status: PieceStatus,
 }
 
 /// End of a wall.
@@ -129,7 +153,7 @@ pub enum ReadingCause {
     First,
     /// Two or more mirror reflections.
     Multiple,
-    /// Diffraction at an edge.
+    /// Diffraction at an edge or a thin post.
     Edge,
     /// Predicted missing echo or target below the minimum range.
     NoRange,
@@ -165,7 +189,7 @@ pub enum SearchEnd {
 
 impl Survey {
     /// Scene of the best plan with the poses as `stop-1`, `stop-2`, ..., without conjectured
-    /// stretches unless `is_closed`.
+    /// stretches and posts unless `is_closed`.
     #[must_use]
     pub fn scene(&self, name: &str, is_closed: bool) -> SceneBuilder {
         let mut scene = Scene::builder(name).material(MATERIAL, self.reflectance);
@@ -175,6 +199,12 @@ impl Survey {
             for (at, ends) in kept.into_iter().enumerate() {
                 let id = if is_single { wall.id.clone() } else { format!("{}-{at}", wall.id) };
                 scene = scene.walls(&id, &ends.map(|end| end.map(rounded)), MATERIAL);
+            }
+        }
+        for post in &self.posts {
+            if is_closed || post.status != PieceStatus::Conjectured {
+                let (center_m, radius_m) = (post.center_m.map(rounded), rounded(post.radius_m));
+                scene = scene.cylinder(&post.id, center_m, radius_m, MATERIAL);
             }
         }
         for (of, number) in self.poses.iter().zip(1..) {

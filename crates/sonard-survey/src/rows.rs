@@ -3,7 +3,7 @@
 use sonard_inverse::{SceneMotion, length_derivative};
 use sonard_model::{
     geometry::{DVec2, wrap_180, wrap_pi},
-    model::{Mechanism, Path, Reflector, Simulator},
+    model::{Diffractor, Mechanism, Path, Reflector, Simulator},
 };
 
 use crate::{
@@ -42,14 +42,7 @@ impl<'a> RowBuilder<'a> {
         (simulator, errors): (&'a Simulator, RangeErrors),
         runs: &'a [Run],
     ) -> Self {
-        Self {
-            posed,
-            columns,
-            simulator,
-            errors,
-            runs,
-            motions: motions(&posed.plan, runs, columns),
-        }
+        Self { posed, columns, simulator, errors, runs, motions: motions(posed, runs, columns) }
     }
 
     /// Adds range and bearing of an arc, measured minus predicted.
@@ -66,7 +59,7 @@ impl<'a> RowBuilder<'a> {
         let is_known = path.mechanisms().all(|mechanism| {
             matches!(
                 mechanism,
-                Mechanism::Reflection(Reflector::Wall(_))
+                Mechanism::Reflection(Reflector::Wall(_) | Reflector::Cylinder(_))
                     | Mechanism::Diffraction(_)
                     | Mechanism::Transducer
             )
@@ -109,14 +102,24 @@ impl<'a> RowBuilder<'a> {
         row
     }
 
-    /// Derivatives of the azimuth of a path: those of its virtual feature if all are mirrors, else
-    /// by the heading only.
+    /// Derivatives of the azimuth of a path: those of its virtual feature if all are mirrors, those
+    /// of the centre of a post that returns it directly, else by the heading only.
     fn bearing_row(&self, path: &Path, sweep: usize) -> Vec<(usize, f64)> {
         const STEP: f64 = 1e-5;
         let mut row: Vec<(usize, f64)> =
             pose_column(sweep).map(|at| (at + 2, -1.0)).into_iter().collect();
-        let Some(lines) = self.mirrors(path) else { return row };
         let place = self.posed.poses[sweep].position();
+        if let Some(post) = direct_post(path) {
+            let to = self.posed.posts[post].center - place;
+            let across = to.perp() / to.length_squared();
+            let at = self.columns.of_post(post);
+            row.extend([(at, across.x), (at + 1, across.y)]);
+            if let Some(at) = pose_column(sweep) {
+                row.extend([(at, -across.x), (at + 1, -across.y)]);
+            }
+            return row;
+        }
+        let Some(lines) = self.mirrors(path) else { return row };
         let numbers = |line: usize| {
             let line = &self.posed.plan.lines[line];
             (line.normal_rad, line.distance_m)
@@ -170,9 +173,24 @@ impl<'a> RowBuilder<'a> {
     }
 }
 
-/// Velocities of the ends of walls by each number of each line, by column.
+/// Post that returns an echo directly.
+pub(crate) fn direct_post(path: &Path) -> Option<usize> {
+    let mut mechanisms = path.mechanisms();
+    match (mechanisms.next(), mechanisms.next()) {
+        (
+            Some(
+                Mechanism::Reflection(Reflector::Cylinder(post))
+                | Mechanism::Diffraction(Diffractor::Post { cylinder: post }),
+            ),
+            None,
+        ) => Some(post as usize),
+        _ => None,
+    }
+}
+
+/// Velocities of the ends of walls by each number of each line, and of posts, by column.
 fn motions(
-    plan: &LineArrangement,
+    PosedPlan { plan, posts, .. }: &PosedPlan,
     runs: &[Run],
     columns: &LineColumns,
 ) -> Vec<(usize, SceneMotion)> {
@@ -187,6 +205,14 @@ fn motions(
             });
             let motion = SceneMotion { walls: walls.collect(), ..SceneMotion::default() };
             motions.push((at + usize::from(is_distance), motion));
+        }
+    }
+    for post in 0..posts.len() {
+        let parts = [(DVec2::X, 0.0), (DVec2::Y, 0.0), (DVec2::ZERO, 1.0)];
+        for (offset, (velocity, growth)) in parts.into_iter().enumerate() {
+            let cylinders = vec![(post as u32, velocity, growth)];
+            let motion = SceneMotion { cylinders, ..SceneMotion::default() };
+            motions.push((columns.of_post(post) + offset, motion));
         }
     }
     motions

@@ -87,7 +87,7 @@ pub(crate) fn observed_stretches(
 
 /// Explained arcs; `None` where a sweep has too many unexplained ones: then its pose may be wrong,
 /// and the walls that it shares with the others.
-fn consistent_arcs<'a>(
+pub(crate) fn consistent_arcs<'a>(
     judge: &Judge<'a>,
     predictions: &'a Predictions,
 ) -> Option<Vec<ExplainedArc<'a>>> {

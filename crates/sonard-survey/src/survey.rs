@@ -17,6 +17,7 @@ use crate::{
     polish::polish,
     pose_grid::improve_poses,
     posed::PosedPlan,
+    posts::{MAX_POSTS, PostKind, PostShape, with_new_posts, without_idle_posts},
     progress::{NoObserver, SurveyObserver, SurveyProgress, SurveyStage},
     range_errors::{FINE_SIGMA_M, RangeErrors},
     readings::Readings,
@@ -109,7 +110,7 @@ pub fn resume_survey(
     Ok(report(sweeps, &search.posed, &assessment, &search.covariance, &workspace, (end, options)))
 }
 
-/// Score of given walls (pairs of ends, metres) and poses, nats, as that of a [`Survey`].
+/// Score of given walls (pairs of ends, metres), posts and poses, nats, as that of a [`Survey`].
 ///
 /// # Errors
 /// As [`survey`].
@@ -117,12 +118,13 @@ pub fn score_plan(
     world: &World,
     sweeps: &[FitSweep],
     options: &SurveyOptions,
-    walls: &[[DVec2; 2]],
+    (walls, posts): (&[[DVec2; 2]], &[PostShape]),
     poses: &[Pose],
 ) -> Result<f64, SurveyError> {
     let scores = PlanScores::default();
     let workspace = workspace(world, sweeps, options, (&NoObserver, &scores))?;
-    let judge = Judge::new(&workspace, poses, workspace.errors.final_sigma_m());
+    let sigma_m = workspace.errors.final_sigma_m();
+    let judge = Judge::new(&workspace, poses, sigma_m).with_posts(posts);
     let segment = |(line, &[a, b]): (usize, &[DVec2; 2])| Segment { line, a, b };
     Ok(judge.score_segments(&walls.iter().enumerate().map(segment).collect::<Vec<_>>()))
 }
@@ -143,12 +145,12 @@ pub fn score_refined_plan(
     let workspace = workspace(world, sweeps, options, (&NoObserver, &scores))?;
     let mut search = SurveySearch::new(&workspace, options);
     let (plan, walls) = LineArrangement::of_walls(walls, poses, workspace.reach_m());
-    search.posed = PosedPlan { plan, walls, poses: poses.to_vec() };
+    search.posed = PosedPlan { plan, walls, posts: Vec::new(), poses: poses.to_vec() };
     for (number, round) in ROUNDS.iter().enumerate() {
         let sigma_m = workspace.errors.sigma_m(round.sigma_m);
-        let judge = Judge::new(&workspace, &search.posed.poses, sigma_m);
+        let judge = Judge::of(&workspace, &search.posed, sigma_m);
         search.improve_poses(&judge, number);
-        let judge = Judge::new(&workspace, &search.posed.poses, sigma_m);
+        let judge = Judge::of(&workspace, &search.posed, sigma_m);
         search.refine(&judge, workspace.errors.gate_m(round.gate_m));
     }
     Ok(search.score_now(workspace.errors.final_sigma_m()))
@@ -283,7 +285,8 @@ impl<'a> SurveySearch<'a> {
                 break;
             }
             let before = self.state();
-            self.drop_short_walls();
+            // Their directions, mostly those of chance alignments, go with them.
+            self.posed = self.posed.without_short_walls(SHORT_M);
             self.rounds(1);
             if self.score < before.score {
                 self.restore(before);
@@ -297,7 +300,7 @@ impl<'a> SurveySearch<'a> {
     fn find_boxes(&mut self) {
         for _ in 0..MAX_BOXES {
             let sigma_m = self.errors().final_sigma_m();
-            let judge = Judge::new(self.workspace, &self.posed.poses, sigma_m);
+            let judge = Judge::of(self.workspace, &self.posed, sigma_m);
             let grown =
                 (!self.workspace.is_over()).then(|| with_box(&self.posed, &judge, &self.left()));
             let Some(grown) = grown.flatten() else { break };
@@ -331,8 +334,7 @@ impl<'a> SurveySearch<'a> {
     /// with these poses.
     fn find_lost_sweeps(&mut self) {
         for _ in 0..MAX_RESTARTS {
-            let judge =
-                Judge::new(self.workspace, &self.posed.poses, self.errors().final_sigma_m());
+            let judge = Judge::of(self.workspace, &self.posed, self.errors().final_sigma_m());
             let moved = (!self.workspace.is_over()).then(|| relocated(&self.posed, &judge));
             let Some(poses) = moved.flatten() else { break };
             let before = self.state();
@@ -349,18 +351,7 @@ impl<'a> SurveySearch<'a> {
     /// Returns `true` with walls that are too short to be trusted.
     fn has_short_walls(&self) -> bool {
         let walls = self.posed.plan.segments(&self.posed.walls);
-        walls.iter().any(|wall| wall.a.distance(wall.b) < SHORT_M)
-    }
-
-    /// Removes short walls. Their directions, mostly those of chance alignments, go with them.
-    fn drop_short_walls(&mut self) {
-        let PosedPlan { plan, walls, .. } = &mut self.posed;
-        for run in plan.runs(walls) {
-            let wall = plan.segment(&run);
-            if wall.a.distance(wall.b) < SHORT_M {
-                (run.first..=run.last).for_each(|at| walls.set(plan.piece(run.line, at), false));
-            }
-        }
+        walls.iter().any(|wall| wall.length_m() < SHORT_M)
     }
 
     /// Runs rounds from a number on, until no arc is left or a round gains nothing.
@@ -369,12 +360,34 @@ impl<'a> SurveySearch<'a> {
             self.report_progress(SurveyStage::Walls { round: number + 1 });
             let before = self.score.filter(|_| number >= ROUNDS.len());
             self.round(number);
+            self.add_posts(number);
             let is_settled = before
                 .is_some_and(|before| self.score.is_some_and(|now| now < before + MIN_ROUND_GAIN));
             let is_done = number + 1 >= ROUNDS.len() && self.left().is_empty();
             if is_settled || is_done || self.workspace.is_over() {
                 break;
             }
+        }
+    }
+
+    /// Adds posts at unexplained arcs as long as they gain, and removes those that do not pay.
+    fn add_posts(&mut self, number: usize) {
+        let round = &ROUNDS[number.min(ROUNDS.len() - 1)];
+        let sigma_m = self.errors().sigma_m(round.sigma_m);
+        let gate_m = self.errors().gate_m(round.gate_m);
+        let is_last = number + 1 >= ROUNDS.len();
+        let kind = if is_last { PostKind::Any } else { PostKind::Round };
+        for _ in 0..2 * MAX_POSTS {
+            let judge = Judge::of(self.workspace, &self.posed, sigma_m);
+            if self.workspace.is_over() || self.posed.posts.is_empty() && self.left().is_empty() {
+                break;
+            }
+            let changed = without_idle_posts(&self.posed, &judge)
+                .or_else(|| with_new_posts(&self.posed, &judge, kind, |posed| self.left_by(posed)));
+            let Some(changed) = changed else { break };
+            self.posed = changed;
+            self.refine(&judge, gate_m);
+            self.score = Some(self.score_now(sigma_m));
         }
     }
 
@@ -396,7 +409,7 @@ impl<'a> SurveySearch<'a> {
             plan.transfer(&self.posed.plan, &self.posed.walls)
         };
         let sigma_m = self.errors().sigma_m(round.sigma_m);
-        let judge = Judge::new(self.workspace, &self.posed.poses, sigma_m);
+        let judge = Judge::of(self.workspace, &self.posed, sigma_m);
         let judge = match self.begins_at_odometry() {
             true => judge.with_free_headings(),
             false => judge,
@@ -406,7 +419,7 @@ impl<'a> SurveySearch<'a> {
         (self.posed.plan, self.posed.walls) = (plan, found.walls);
         let poses = judge.poses_of(&self.posed.plan.segments(&self.posed.walls));
         self.posed.poses = poses.unwrap_or(judge.poses);
-        let judge = Judge::new(self.workspace, &self.posed.poses, sigma_m);
+        let judge = Judge::of(self.workspace, &self.posed, sigma_m);
         self.improve_poses(&judge, number);
         self.refine(&judge, self.errors().gate_m(round.gate_m));
         self.score = Some(self.score_now(sigma_m));
@@ -427,13 +440,13 @@ impl<'a> SurveySearch<'a> {
     }
 
     fn score_now(&self, sigma_m: f64) -> f64 {
-        let judge = Judge::new(self.workspace, &self.posed.poses, sigma_m);
+        let judge = Judge::of(self.workspace, &self.posed, sigma_m);
         judge.score(&self.posed.plan, &self.posed.walls)
     }
 
     /// Arrangement of the candidate lines of a round.
     fn arrangement(&self, round: &Round, is_first: bool) -> LineArrangement {
-        let PosedPlan { plan, walls, poses } = &self.posed;
+        let PosedPlan { plan, walls, poses, .. } = &self.posed;
         let segments = plan.segments(walls);
         let left = self.left();
         let is_used = |line: usize| segments.iter().any(|wall| wall.line == line);
@@ -454,8 +467,13 @@ impl<'a> SurveySearch<'a> {
 
     /// Arcs that the walls leave unexplained.
     fn left(&self) -> Vec<&'a crate::arc::Arc> {
-        let judge = Judge::new(self.workspace, &self.posed.poses, 1.0);
-        let segments = self.posed.plan.segments(&self.posed.walls);
+        self.left_by(&self.posed)
+    }
+
+    /// Arcs that a plan leaves unexplained.
+    fn left_by(&self, posed: &PosedPlan) -> Vec<&'a crate::arc::Arc> {
+        let judge = Judge::of(self.workspace, posed, 1.0);
+        let segments = posed.plan.segments(&posed.walls);
         let workspace = self.workspace;
         match judge.predictions(&segments) {
             Some((_, predictions)) => unexplained(
@@ -485,9 +503,9 @@ impl<'a> SurveySearch<'a> {
         let errors = self.errors();
         for is_last in [false, false, true] {
             let sigma_m = errors.sigma_m(LAST_ROUND.sigma_m);
-            let judge = Judge::new(self.workspace, &self.posed.poses, sigma_m);
+            let judge = Judge::of(self.workspace, &self.posed, sigma_m);
             polish(&mut self.posed, &judge);
-            let judge = Judge::new(self.workspace, &self.posed.poses, sigma_m);
+            let judge = Judge::of(self.workspace, &self.posed, sigma_m);
             let mut assessment = assess(&self.posed, &judge, self.covariance.as_ref());
             match assessment.better.take().filter(|_| !is_last) {
                 Some(better) => {

@@ -57,10 +57,9 @@ pub(crate) fn equivalent_poses(posed: &PosedPlan, judge: &Judge) -> Vec<Vec<Pose
 }
 
 fn motions(segments: &[Segment]) -> Vec<Motion> {
-    let length_m = |of: &Segment| of.a.distance(of.b);
-    let longest = segments.iter().max_by(|a, b| length_m(a).total_cmp(&length_m(b)));
+    let longest = segments.iter().max_by(|a, b| a.length_m().total_cmp(&b.length_m()));
     let Some(longest) = longest else { return Vec::new() };
-    let is_equal = |of: &&Segment| (length_m(of) - length_m(longest)).abs() < SAME_LENGTH_M;
+    let is_equal = |of: &&Segment| (of.length_m() - longest.length_m()).abs() < SAME_LENGTH_M;
     let equal = segments.iter().filter(is_equal);
     let both = equal.flat_map(|of| [[of.a, of.b], [of.b, of.a]]);
     both.map(|ends| Motion::between([longest.a, longest.b], ends)).collect()

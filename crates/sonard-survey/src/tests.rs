@@ -2,6 +2,7 @@
 
 mod boxes;
 mod coarse;
+mod posts;
 mod rectangle;
 mod stages;
 mod undetermined;

@@ -305,6 +305,33 @@ class SurveyedWall:
         return f"<SurveyedWall '{self.id}': {self.length_m():.3f} m, {self.length_m('observed'):.3f} m observed>"
 
 
+@dataclass(frozen=True, slots=True, repr=False)
+class SurveyedPost:
+    """Upright cylinder of a surveyed room, such as a table leg, with its uncertainty."""
+
+    id: str
+    """Name of the post in the scene."""
+    center: tuple[float, float]
+    """Axis, x and y in metres."""
+    radius_m: float
+    """Radius, metres."""
+    sigma_m: tuple[float, float]
+    """Standard deviations of x and y of the axis, metres; ``nan`` if unknown."""
+    sigma_radius_m: float
+    """Standard deviation of the radius, metres; ``nan`` if unknown."""
+    evidence_nats: float
+    """Loss of score without the post, nats."""
+    sweeps: int
+    """Number of sweeps with a direct echo of the post."""
+    status: Literal["observed", "conjectured"]
+    """``"observed"`` if direct echoes of two sweeps or more determine it to 1 cm and the score is over 10 nats less without it,
+    otherwise ``"conjectured"``: not in the scene unless ``closed``."""
+
+    def __repr__(self) -> str:
+        x, y = self.center
+        return f"<SurveyedPost '{self.id}': ({x:.3f}, {y:.3f}) m, radius {self.radius_m:.3f} m, {self.status}>"
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class AlternativePlan:
     """Floor plan that explains the readings nearly as well as the best one."""
@@ -351,12 +378,14 @@ class Survey:
     """Identifiers of the scans."""
     walls: tuple[SurveyedWall, ...]
     """Walls with their uncertainty and status."""
+    posts: tuple[SurveyedPost, ...]
+    """Posts with their uncertainty and status."""
     alternatives: tuple[AlternativePlan, ...]
     """Other plans within 10 nats, most probable first."""
     probability: float
     """Probability of the plan among the alternatives and itself, 0 to 1."""
     score: float
-    """Logarithm of the likelihood of the readings, less the price of the walls, nats."""
+    """Logarithm of the likelihood of the readings, less the price of walls and posts, nats."""
     end: Literal["complete", "unexplained_arcs", "budget", "cancelled"]
     """Reason why the search ended: all arcs are explained, or some remain although no change gains; the budget of
     ``max_scenes`` is spent, or the search was cancelled."""
@@ -384,6 +413,7 @@ class Survey:
             equivalent=tuple(_pose_rows(pose["equivalent"]) for pose in poses),
             scans=tuple(pose["scan"] for pose in poses),
             walls=tuple(_surveyed_wall(wall) for wall in found["walls"]),
+            posts=tuple(_surveyed_post(post) for post in found["posts"]),
             alternatives=tuple(
                 AlternativePlan(np.array(plan["walls"], dtype=float), plan["score_difference"], plan["probability"])
                 for plan in found["alternatives"]
@@ -409,6 +439,22 @@ class Survey:
 def _pose_rows(poses: list[dict[str, float]]) -> NDArray[np.float64]:
     rows = [[pose["x_m"], pose["y_m"], pose["heading_deg"]] for pose in poses]
     return np.array(rows, dtype=float).reshape(-1, 3)
+
+
+def _surveyed_post(post: dict[str, Any]) -> SurveyedPost:
+    x_m, y_m = post["center_m"]
+    sigma_x_m, sigma_y_m = post["sigma_m"] or [np.nan] * 2
+    sigma_radius_m = np.nan if post["sigma_radius_m"] is None else post["sigma_radius_m"]
+    return SurveyedPost(
+        id=post["id"],
+        center=(x_m, y_m),
+        radius_m=post["radius_m"],
+        sigma_m=(sigma_x_m, sigma_y_m),
+        sigma_radius_m=sigma_radius_m,
+        evidence_nats=post["evidence_nats"],
+        sweeps=post["sweeps"],
+        status=post["status"],
+    )
 
 
 def _surveyed_wall(wall: dict[str, Any]) -> SurveyedWall:

@@ -31,6 +31,11 @@ pub(super) fn write(args: &Args, overwrite: Overwrite, input: &Input, found: &Su
         .flat_map(|wall| &wall.pieces)
         .map(|piece| (certainty(piece.status), [piece.from_m, piece.to_m].map(DVec2::from)))
         .collect();
+    let posts: Vec<(WallCertainty, DVec2, f64)> = found
+        .posts
+        .iter()
+        .map(|post| (certainty(post.status), post.center_m.into(), post.radius_m))
+        .collect();
     let ends = found.walls.iter().flat_map(|wall| [&wall.from, &wall.to]);
     let corners: Vec<(DVec2, f64)> = ends.filter_map(corner).collect();
     let poses: Vec<_> = found.poses.iter().map(|of| of.pose).collect();
@@ -39,6 +44,7 @@ pub(super) fn write(args: &Args, overwrite: Overwrite, input: &Input, found: &Su
         lines: vec![super::summary::in_short(input, found)],
         badge: badge_among(input.provenances.iter().copied()),
         walls: &walls,
+        posts: &posts,
         corners: &corners,
         poses: &poses,
         echoes: &echoes(input, found),

@@ -9,15 +9,19 @@ use super::Input;
 use crate::{
     cli::table::{align_right, fit, ruled},
     scan::text::format_count,
-    survey::{PieceStatus, ReadingCause, SearchEnd, Survey, SurveyedWall},
+    survey::{PieceStatus, ReadingCause, SearchEnd, Survey, SurveyedPost, SurveyedWall},
 };
 
 /// Walls, arcs and end of the search in a sentence.
 pub(super) fn in_short(input: &Input, found: &Survey) -> String {
     let explained = found.arcs - found.unexplained.len();
+    let walls = format_count(found.walls.len(), "wall");
+    let posts = match found.posts.len() {
+        0 => String::new(),
+        count => format!(" and {}", format_count(count, "post")),
+    };
     format!(
-        "{} from {}; {explained} of {} explained",
-        format_count(found.walls.len(), "wall"),
+        "{walls}{posts} from {}; {explained} of {} explained",
         format_count(input.sweeps.len(), "sweep"),
         format_count(found.arcs, "arc"),
     )
@@ -97,6 +101,7 @@ fn status_length_m(wall: &SurveyedWall, status: PieceStatus) -> f64 {
 
 const WALL_HEAD: [&str; 7] =
     ["wall", "from m", "to m", "across \u{b1} mm", "observed m", "implied m", "conjectured m"];
+const POST_HEAD: [&str; 6] = ["post", "x m", "y m", "radius mm", "\u{b1} mm, radius", "status"];
 const POSE_HEAD: [&str; 5] = ["stop", "x m", "y m", "heading deg", "\u{b1} mm, deg"];
 
 fn wall_row(wall: &SurveyedWall) -> [String; 7] {
@@ -108,6 +113,20 @@ fn wall_row(wall: &SurveyedWall) -> [String; 7] {
     let ends = [wall.from.at_m, wall.to.at_m].map(place);
     let [from, to] = ends;
     [wall.id.clone(), from, to, across, observed, implied, conjectured]
+}
+
+fn post_row(post: &SurveyedPost) -> [String; 6] {
+    let sigma = match (post.sigma_m, post.sigma_radius_m) {
+        (Some([x, y]), Some(radius)) => format!("{:.2}, {:.2}", 1e3 * x.max(y), 1e3 * radius),
+        _ => "-".to_owned(),
+    };
+    let status = match post.status {
+        PieceStatus::Observed => "observed",
+        PieceStatus::Implied => "implied",
+        PieceStatus::Conjectured => "conjectured",
+    };
+    let [x, y] = post.center_m.map(|m| format!("{m:.4}"));
+    [post.id.clone(), x, y, format!("{:.1}", 1e3 * post.radius_m), sigma, status.to_owned()]
 }
 
 fn pose_rows(found: &Survey) -> impl Iterator<Item = [String; 5]> + '_ {
@@ -135,6 +154,14 @@ pub(super) fn print(out: &mut impl Write, input: &Input, found: &Survey) -> io::
     });
     align_right(&mut walls, 3..usize::MAX);
     writeln!(out, "{}", fit(walls))?;
+    if !found.posts.is_empty() {
+        let mut posts = ruled(POST_HEAD);
+        found.posts.iter().for_each(|post| {
+            posts.add_row(post_row(post));
+        });
+        align_right(&mut posts, 1..5);
+        writeln!(out, "{}", fit(posts))?;
+    }
     let mut poses = ruled(POSE_HEAD);
     pose_rows(found).for_each(|row| {
         poses.add_row(row);
@@ -154,6 +181,10 @@ pub(super) fn markdown(input: &Input, found: &Survey) -> String {
     text += "\n![Floor plan](plan.png)\n\n";
     text += &table(&WALL_HEAD, found.walls.iter().map(|wall| wall_row(wall).to_vec()));
     text += "\n";
+    if !found.posts.is_empty() {
+        text += &table(&POST_HEAD, found.posts.iter().map(|post| post_row(post).to_vec()));
+        text += "\n";
+    }
     text += &table(&POSE_HEAD, pose_rows(found).map(|row| row.to_vec()));
     text
 }

@@ -18,11 +18,12 @@ use sonard_model::{
     scene::Scene,
 };
 use sonard_survey::{
-    NoObserver, OdometrySigma, PieceStatus, SearchEnd, Survey, SurveyOptions, score_plan, survey,
+    NoObserver, OdometrySigma, PieceStatus, PostShape, SearchEnd, Survey, SurveyOptions,
+    score_plan, survey,
 };
 
 use measure::{Ends, RigidMotion, corner_errors_m, coverage, explained, median, reflecting_walls};
-use rooms::{RoomKind, draw_course, draw_place, draw_room, drift, generator};
+use rooms::{RoomKind, add_posts, draw_course, draw_place, draw_room, drift, generator};
 use simulate::{ReadingNoise, sweeps};
 
 /// Settings of an evaluation.
@@ -47,6 +48,8 @@ struct Trial {
     outer_recall: f64,
     /// Number of inner walls that reflect a reading of the true room, and of those found.
     faces: [usize; 2],
+    /// Number of posts, of those observed within 2 cm, and of those observed elsewhere.
+    posts: [usize; 3],
     precision: f64,
     corners_m: Vec<f64>,
     position_m: f64,
@@ -71,8 +74,17 @@ struct Trial {
 }
 
 /// Quantities with intervals.
-const QUANTITIES: [&str; 6] =
-    ["x", "y", "heading", "wall's position", "wall's direction", "corner"];
+const QUANTITIES: [&str; 9] = [
+    "x",
+    "y",
+    "heading",
+    "wall's position",
+    "wall's direction",
+    "corner",
+    "post's x",
+    "post's y",
+    "post's radius",
+];
 
 const MAX_RANGE_M: f64 = 4.0;
 /// Number of places that the survey does not visit.
@@ -121,15 +133,18 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 const HEAD: &str = "| kind | rooms | complete | recall | precision | corner mm | position mm | heading deg | \
-held | true room | score within 5 | wrong observed m | outer recall | faces found | determined | complete of these | CPU s | scenes |";
+held | true room | score within 5 | wrong observed m | outer recall | faces found | posts found | wrong posts | determined | complete of these | CPU s | scenes |";
 
 fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn Error>> {
     let mut random = generator(kind, seed);
-    let room = draw_room(kind, &mut random)?;
+    let mut room = draw_room(kind, &mut random)?;
+    let poses = draw_course(&room, settings.stops, &mut random);
+    if kind == RoomKind::Posts {
+        add_posts(&mut room, &poses, &mut random);
+    }
     let sensor = Sensor::preset("senscomp-6500")?;
     let options = Options { max_range_m: Some(MAX_RANGE_M), ..Options::default() };
     let world = World::new(Arc::new(room), sensor, Air::default(), options);
-    let poses = draw_course(&world.scene, settings.stops, &mut random);
     let odometry = drift(&poses, settings.odometry, &mut random);
     let mut readings = sweeps(&world, &poses, settings.beams, settings.noise, &mut random)?;
     let held: Vec<Pose> = (0..HELD_PLACES)
@@ -157,7 +172,10 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
     let found = survey(&world, &readings, &options, &NoObserver)?;
     let seconds = cpu_s() - start_s;
     let truth: Vec<Ends> = world.scene.walls.iter().map(|wall| [wall.a, wall.b]).collect();
-    let true_score = score_plan(&world, &readings, &options, &truth, &poses)?;
+    let cylinders = world.scene.cylinders.iter();
+    let true_posts: Vec<PostShape> =
+        cylinders.map(|of| PostShape { center: of.center, radius_m: of.radius_m }).collect();
+    let true_score = score_plan(&world, &readings, &options, (&truth, &true_posts), &poses)?;
     let found_poses = nearest_poses(&found, &poses);
     let motion = RigidMotion::between(&found_poses, &poses);
     let walls = walls(&found, &motion);
@@ -172,9 +190,10 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
         .sum();
     if settings.prints_walls {
         print_walls(&found, &motion, &truth);
+        print_posts(&found, &motion, &true_posts);
     }
     // The frame of the survey is the first pose of odometry, which is the true one.
-    let intervals = intervals(&found, &poses, &truth);
+    let intervals = intervals(&found, &poses, &truth, &true_posts);
     let scene = found.scene("found", false).build()?;
     let (outer, inner): (Vec<Ends>, Vec<Ends>) = {
         let mut inner = Vec::new();
@@ -209,6 +228,7 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
         recall: coverage(&truth, &walls, 0.02, 2.0),
         outer_recall: coverage(&outer, &walls, 0.02, 2.0),
         faces: [inner.len(), inner.iter().filter(is_found).count()],
+        posts: count_posts(&found, &motion, &true_posts),
         precision: coverage(&walls, &truth, 0.02, 2.0),
         corners_m: corner_errors_m(&truth, &walls),
         position_m,
@@ -225,6 +245,56 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
         scenes: found.scored_scenes,
         seconds,
     })
+}
+
+/// Maximum distance of the axis of a post from the true one, metres.
+const POST_M: f64 = 0.02;
+
+/// Number of true posts, of those that an observed one is near, and of other observed ones.
+fn count_posts(found: &Survey, motion: &RigidMotion, truth: &[PostShape]) -> [usize; 3] {
+    let observed = found.posts.iter().filter(|post| post.status == PieceStatus::Observed);
+    let centers: Vec<DVec2> = observed.map(|post| motion.of(post.center_m.into())).collect();
+    let is_near = |a: DVec2, b: DVec2| a.distance(b) < POST_M;
+    let is_found = |post: &&PostShape| centers.iter().any(|at| is_near(*at, post.center));
+    let is_wrong = |at: &&DVec2| !truth.iter().any(|post| is_near(**at, post.center));
+    [truth.len(), truth.iter().filter(is_found).count(), centers.iter().filter(is_wrong).count()]
+}
+
+/// Deviations of x, y and radius of observed posts from the true ones near them, in standard
+/// deviations.
+fn post_deviations(found: &Survey, truth: &[PostShape]) -> Vec<[f64; 3]> {
+    let observed = found.posts.iter().filter(|post| post.status == PieceStatus::Observed);
+    let deviations = observed.filter_map(|post| {
+        let center = DVec2::from(post.center_m);
+        let own = truth.iter().find(|of| of.center.distance(center) < POST_M)?;
+        let off = center - own.center;
+        let [x_m, y_m] = post.sigma_m?;
+        let radius_m = post.radius_m - own.radius_m;
+        Some([off.x / x_m, off.y / y_m, radius_m / post.sigma_radius_m?])
+    });
+    deviations.collect()
+}
+
+/// Posts with their status, in the true frame, and the true posts.
+fn print_posts(found: &Survey, motion: &RigidMotion, truth: &[PostShape]) {
+    for PostShape { center, radius_m } in truth {
+        println!("#   true post ({:.3}, {:.3}) radius {radius_m:.4}", center.x, center.y);
+    }
+    for post in &found.posts {
+        let at = motion.of(post.center_m.into());
+        println!(
+            "#   {} ({:.3}, {:.3}) radius {:.4} {:?} sweeps {} evidence {:.1} sigma {:?} {:?}",
+            post.id,
+            at.x,
+            at.y,
+            post.radius_m,
+            post.status,
+            post.sweeps,
+            post.evidence_nats,
+            post.sigma_m,
+            post.sigma_radius_m,
+        );
+    }
 }
 
 /// Poses found, of those that the survey lists as equivalent the ones nearest to the truth.
@@ -246,12 +316,21 @@ fn nearest_poses(found: &Survey, truth: &[Pose]) -> Vec<Pose> {
 }
 
 /// Numbers of 95 % intervals that hold the truth, and of all, by [`QUANTITIES`].
-fn intervals(found: &Survey, poses: &[Pose], truth: &[Ends]) -> [[usize; 2]; QUANTITIES.len()] {
+fn intervals(
+    found: &Survey,
+    poses: &[Pose],
+    truth: &[Ends],
+    posts: &[PostShape],
+) -> [[usize; 2]; QUANTITIES.len()] {
     let of_poses = pose_deviations(found, poses);
     let of_walls = wall_deviations(found, truth);
     let [x, y, heading] = [0, 1, 2].map(|at| count_inside(of_poses.iter().map(|of| of[at])));
     let [position, direction] = [0, 1].map(|at| count_inside(of_walls.iter().map(|of| of[at])));
-    [x, y, heading, position, direction, count_inside(corner_deviations(found, truth).into_iter())]
+    let corner = count_inside(corner_deviations(found, truth).into_iter());
+    let of_posts = post_deviations(found, posts);
+    let [post_x, post_y, radius] =
+        [0, 1, 2].map(|at| count_inside(of_posts.iter().map(|of| of[at])));
+    [x, y, heading, position, direction, corner, post_x, post_y, radius]
 }
 
 /// Deviations of x, y and heading of poses, in standard deviations.
@@ -356,7 +435,7 @@ fn print_trial(kind: RoomKind, trial: &Trial) {
     let corner_mm = 1e3 * median(trial.corners_m.clone());
     println!(
         "# {kind} {}: recall {:.3} precision {:.3} corner {corner_mm:.1} mm poses {:.2} mm {:.3} deg held {:.3} \
-         ({:.3}) score {:+.1} observed wrong {:.2} m listed {} determined {} unexplained {} of {} arcs {:?} {} scenes \
+         ({:.3}) score {:+.1} observed wrong {:.2} m posts {:?} listed {} determined {} unexplained {} of {} arcs {:?} {} scenes \
          {:.1} s {}",
         trial.seed,
         trial.recall,
@@ -367,6 +446,7 @@ fn print_trial(kind: RoomKind, trial: &Trial) {
         trial.true_held,
         trial.lead_nats,
         trial.wrong_observed_m,
+        trial.posts,
         trial.is_listed,
         trial.is_determined,
         trial.arcs[0],
@@ -385,7 +465,7 @@ fn print_summary(kind: RoomKind, trials: &[Trial]) {
     let corners: Vec<f64> =
         trials.iter().flat_map(|trial| trial.corners_m.iter().copied()).collect();
     println!(
-        "| {kind} | {} | {} | {:.3} | {:.3} | {:.2} | {:.2} | {:.3} | {:.3} | {:.3} | {} | {:.2} | {:.3} | {} of {} | {} | {} | {:.1} | {:.0} |",
+        "| {kind} | {} | {} | {:.3} | {:.3} | {:.2} | {:.2} | {:.3} | {:.3} | {:.3} | {} | {:.2} | {:.3} | {} of {} | {} of {} | {} | {} | {} | {:.1} | {:.0} |",
         trials.len(),
         trials.iter().filter(|trial| trial.is_complete()).count(),
         mean(&|trial| trial.recall),
@@ -401,6 +481,9 @@ fn print_summary(kind: RoomKind, trials: &[Trial]) {
         mean(&|trial| trial.outer_recall),
         trials.iter().map(|trial| trial.faces[1]).sum::<usize>(),
         trials.iter().map(|trial| trial.faces[0]).sum::<usize>(),
+        trials.iter().map(|trial| trial.posts[1]).sum::<usize>(),
+        trials.iter().map(|trial| trial.posts[0]).sum::<usize>(),
+        trials.iter().map(|trial| trial.posts[2]).sum::<usize>(),
         trials.iter().filter(|trial| trial.is_determined).count(),
         trials.iter().filter(|trial| trial.is_determined && trial.is_complete()).count(),
         mean(&|trial| trial.seconds),

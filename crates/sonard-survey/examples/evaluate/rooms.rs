@@ -7,7 +7,7 @@ use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
 use sonard_model::{
     geometry::{DVec2, Pose},
-    scene::{Scene, SceneError},
+    scene::{Cylinder, Scene, SceneError},
 };
 
 /// Kind of a random room.
@@ -23,11 +23,13 @@ pub(crate) enum RoomKind {
     L,
     /// Rectangle with a box inside.
     Box,
+    /// Rectangle or L with one to three posts.
+    Posts,
 }
 
 impl RoomKind {
-    pub(crate) const ALL: [Self; 5] =
-        [Self::Rectangle, Self::Oblique, Self::Cut, Self::L, Self::Box];
+    pub(crate) const ALL: [Self; 6] =
+        [Self::Rectangle, Self::Oblique, Self::Cut, Self::L, Self::Box, Self::Posts];
 
     const fn name(self) -> &'static str {
         match self {
@@ -36,6 +38,7 @@ impl RoomKind {
             Self::Cut => "cut",
             Self::L => "l",
             Self::Box => "box",
+            Self::Posts => "posts",
         }
     }
 }
@@ -66,6 +69,10 @@ pub(crate) fn draw_room(kind: RoomKind, random: &mut impl Rng) -> Result<Scene, 
     let (mut w, mut d) = (random.random_range(2.4..4.0), random.random_range(2.2..3.4));
     let mut inside = Vec::new();
     let outline = match kind {
+        RoomKind::Posts => {
+            let outline = [RoomKind::Rectangle, RoomKind::L][random.random_range(0..2)];
+            return draw_room(outline, random);
+        }
         RoomKind::Rectangle => vec![[0.0, 0.0], [w, 0.0], [w, d], [0.0, d]],
         RoomKind::Oblique => {
             let slant = random.random_range(0.2..0.9);
@@ -109,6 +116,31 @@ const CLEAR_M: f64 = 0.25;
 
 fn is_free(scene: &Scene, at: DVec2) -> bool {
     scene.clearance_m(at) > CLEAR_M && scene.are_accessible(&[at]) == [true]
+}
+
+/// Adds one to three posts with a radius of 2 to 12 cm, at least 0.3 m from walls, stops and each
+/// other.
+pub(crate) fn add_posts(scene: &mut Scene, stops: &[Pose], random: &mut impl Rng) {
+    const CLEAR_M: f64 = 0.3;
+    const MAX_TRIES: usize = 5000;
+    let [low, high] = extent(scene);
+    let material = scene.walls[0].material;
+    let count = random.random_range(1..=3);
+    for _ in 0..MAX_TRIES {
+        if scene.cylinders.len() == count {
+            break;
+        }
+        let center = low + DVec2::new(random.random(), random.random()) * (high - low);
+        let radius_m = random.random_range(0.02..0.12);
+        let clear_m = radius_m + CLEAR_M;
+        let is_clear = scene.clearance_m(center) > clear_m
+            && scene.are_accessible(&[center]) == [true]
+            && stops.iter().all(|stop| stop.position().distance(center) > clear_m);
+        if is_clear {
+            let id = format!("post-{}", scene.cylinders.len() + 1).into();
+            scene.cylinders.push(Cylinder { id, center, radius_m, material, z_m: None });
+        }
+    }
 }
 
 /// Draws a place with clearance.

@@ -35,7 +35,7 @@ fn box_is_completed_from_a_part_of_one_face() {
     let mut part = sides(&rectangle());
     part.push([a.lerp(b, 0.3), a.lerp(b, 0.6)]);
     let (plan, walls) = plan_of(&part, &poses);
-    let posed = PosedPlan { plan, walls, poses: poses.clone() };
+    let posed = PosedPlan { plan, walls, posts: Vec::new(), poses: poses.clone() };
     let found = with_box(&posed, &judge, &[]).expect("a box");
     let score = judge.score(&found.plan, &found.walls);
     assert!(score > truth - 2.0, "{score} {truth}");
@@ -48,6 +48,6 @@ fn box_is_completed_from_a_part_of_one_face() {
     }
     // In a room without boxes there is nothing to complete.
     let (plan, walls) = plan_of(&sides(&rectangle()), &poses);
-    let posed = PosedPlan { plan, walls, poses };
+    let posed = PosedPlan { plan, walls, posts: Vec::new(), poses };
     assert!(with_box(&posed, &judge, &[]).is_none());
 }

@@ -41,7 +41,7 @@ fn rectangle_is_found_from_drifting_odometry() {
     assert!(pieces().all(|piece| piece.status != PieceStatus::Conjectured), "{found:#?}");
     // The score is that of the true room, except for the last tenths of a millimetre.
     let (corners, poses, world, sweeps) = true_rectangle();
-    let truth = score_plan(&world, &sweeps, &options(), &sides(&corners), &poses);
+    let truth = score_plan(&world, &sweeps, &options(), (&sides(&corners), &[]), &poses);
     assert!((found.score - truth.expect("a score")).abs() < 3.0, "{}", found.score);
     let scene = found.scene("found", false).build().expect("a valid scene");
     assert_eq!((scene.walls.len(), scene.poses.len()), (4, 4));

@@ -113,7 +113,7 @@ fn polish_returns_to_the_true_room() {
     let turn = DVec2::from_angle(0.001);
     let turned: Vec<DVec2> = corners.iter().map(|corner| turn.rotate(*corner)).collect();
     let (plan, walls) = plan_of(&sides(&turned), &poses);
-    let mut posed = PosedPlan { plan, walls, poses: poses.clone() };
+    let mut posed = PosedPlan { plan, walls, posts: Vec::new(), poses: poses.clone() };
     let judge = Judge::new(&workspace, &poses, 0.004);
     polish(&mut posed, &judge).expect("determined");
     for (pose, truth) in posed.poses.iter().zip(&truth).skip(1) {
@@ -256,7 +256,7 @@ fn free_headings_are_those_of_the_readings() {
     }
     // Scores with free and with fixed headings are kept apart.
     let [free, off] = [&judge, &fixed].map(|judge| judge.score(&plan, &walls));
-    let truth = fixed.at_poses(&poses).score(&plan, &walls);
+    let truth = Judge::new(&workspace, &poses, 0.01).score(&plan, &walls);
     assert!(free > off + 100.0 && free < truth, "{off} {free} {truth}");
     assert_eq!(judge.score(&plan, &walls), free);
     let again = Judge::new(&workspace, &odometry, 0.01).with_free_headings();

@@ -23,7 +23,7 @@ fn wall_without_evidence_is_never_observed() {
         let mut walls = sides(&corners);
         walls.push(extra);
         let (plan, set) = plan_of(&walls, &poses);
-        let posed = PosedPlan { plan, walls: set, poses: poses.clone() };
+        let posed = PosedPlan { plan, walls: set, posts: Vec::new(), poses: poses.clone() };
         let assessment = assess(&posed, &judge, None);
         let added: Vec<_> = assessment.walls.iter().filter(|wall| wall.segment.line == 4).collect();
         assert!(!added.is_empty());
@@ -46,7 +46,11 @@ fn walls_of_a_lost_course_are_not_observed() {
     let observed = |poses: &[Pose]| {
         let judge = Judge::new(&workspace, poses, 0.004);
         let (plan, walls) = plan_of(&sides(&corners), poses);
-        let assessment = assess(&PosedPlan { plan, walls, poses: poses.to_vec() }, &judge, None);
+        let assessment = assess(
+            &PosedPlan { plan, walls, posts: Vec::new(), poses: poses.to_vec() },
+            &judge,
+            None,
+        );
         let pieces = assessment.walls.iter().flat_map(|wall| &wall.pieces);
         pieces.filter(|piece| piece.status == PieceStatus::Observed).count()
     };
@@ -66,7 +70,7 @@ fn walls_with_wide_intervals_are_not_observed() {
     let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
     let judge = Judge::new(&workspace, &poses, 0.004);
     let (plan, walls) = plan_of(&sides(&corners), &poses);
-    let mut posed = PosedPlan { plan, walls, poses: poses.clone() };
+    let mut posed = PosedPlan { plan, walls, posts: Vec::new(), poses: poses.clone() };
     let covariance = refine(&mut posed, &judge, 0.012, 3).expect("a determined plan");
     let assessed =
         |widened: f64| assess(&posed, &judge, Some(&covariance.scaled(widened * widened))).walls;
@@ -86,7 +90,7 @@ fn walls_with_wide_intervals_are_not_observed() {
 fn half_turn_of_a_rectangle_is_open_without_odometry() {
     let (corners, poses, world, sweeps) = true_rectangle();
     let (plan, walls) = plan_of(&sides(&corners), &poses);
-    let posed = PosedPlan { plan, walls, poses: poses.clone() };
+    let posed = PosedPlan { plan, walls, posts: Vec::new(), poses: poses.clone() };
     for odometry in [None, options().odometry] {
         let scores = PlanScores::default();
         let options = SurveyOptions { odometry, ..options() };
@@ -115,7 +119,7 @@ fn lost_sweep_is_located_in_the_plan_of_the_others() {
     let mut poses = truth.clone();
     let posed = |poses: &[Pose]| {
         let (plan, walls) = plan_of(&sides(&corners), poses);
-        PosedPlan { plan, walls, poses: poses.to_vec() }
+        PosedPlan { plan, walls, posts: Vec::new(), poses: poses.to_vec() }
     };
     assert_eq!(relocated(&posed(&truth), &Judge::new(&workspace, &truth, 0.004)), None);
     poses[2] = Pose { x_m: truth[2].x_m - 0.3, y_m: truth[2].y_m - 0.2, heading_deg: 40.0 };
@@ -145,7 +149,11 @@ fn walls_among_unexplained_arcs_are_not_observed() {
         let workspace = true_workspace(&world, &sweeps, (&NoObserver, &scores));
         let judge = Judge::new(&workspace, &truth, 0.004);
         let (plan, walls) = plan_of(&sides(&corners), &truth);
-        let assessment = assess(&PosedPlan { plan, walls, poses: truth.clone() }, &judge, None);
+        let assessment = assess(
+            &PosedPlan { plan, walls, posts: Vec::new(), poses: truth.clone() },
+            &judge,
+            None,
+        );
         let mut pieces = assessment.walls.iter().flat_map(|wall| &wall.pieces);
         assert_eq!(pieces.any(|piece| piece.status == PieceStatus::Observed), is_observed);
     }

@@ -96,11 +96,14 @@ export class Surveyor {
   /** @param {any} layer @param {any} plan */
   drawUnder(layer, plan) {
     if (!this.found) return;
-    const { walls, poses } = this.found.survey;
+    const { walls, posts, poses } = this.found.survey;
     for (const { pieces } of walls) {
       for (const { from_m, to_m, status } of pieces) {
         drawPiece(layer, plan, status, [from_m, to_m]);
       }
+    }
+    for (const { center_m, radius_m, status } of posts) {
+      circle(layer.pen(status, plan.palette), plan.view.px(center_m), radius_m * plan.view.scale);
     }
     const factor = this.enlargement();
     for (const { pose, sigma_m } of poses) {
@@ -147,10 +150,11 @@ function progressText({ stage, round, walls, scored_scenes }) {
   return `Surveying: ${STAGES[stage]}${of}; ${count(walls, "wall")}, ${count(scored_scenes, "floor plan")} tried`;
 }
 
-function resultText({ survey: { walls, poses, arcs, unexplained, alternatives, end } }) {
+function resultText({ survey: { walls, posts, poses, arcs, unexplained, alternatives, end } }) {
   const early = { cancelled: "Ended early: ", budget: "The budget is spent: " }[end] ?? "";
   const others = alternatives.length ? `; ${count(alternatives.length, "other plan")} possible` : "";
-  return `${early}${count(walls.length, "wall")} from ${count(poses.length, "scan")}, ${arcs - unexplained.length} of ${count(arcs, "arc")} explained${others}`;
+  const round = posts.length ? ` and ${count(posts.length, "post")}` : "";
+  return `${early}${count(walls.length, "wall")}${round} from ${count(poses.length, "scan")}, ${arcs - unexplained.length} of ${count(arcs, "arc")} explained${others}`;
 }
 
 const sceneFile = (scene) => new Blob([`${JSON.stringify(scene, null, 2)}\n`], { type: "application/json" });

@@ -1,0 +1,292 @@
+//! Posts: upright cylinders such as table legs, found from arcs that the walls leave unexplained.
+
+use rayon::prelude::*;
+use sonard_model::geometry::{DVec2, Pose, distance_to_segment, wrap_pi};
+
+use crate::{
+    arc::Arc,
+    arrangement::Segment,
+    judge::{Judge, POST_NATS},
+    normal::NormalEquations,
+    posed::PosedPlan,
+};
+
+/// Upright cylinder of a plan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PostShape {
+    /// Axis, metres.
+    pub center: DVec2,
+    /// Radius, metres.
+    pub radius_m: f64,
+}
+
+/// Posts that are looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum PostKind {
+    /// Those that differ from a corner or an edge, which have the echoes of a post without a
+    /// radius: as long as walls are missing.
+    Round,
+    Any,
+}
+
+/// Limits of the radius of a post, metres.
+pub(crate) const RADIUS_M: [f64; 2] = [0.004, 0.15];
+/// Prior of the radius of a candidate, mean and standard deviation, metres: legs and columns.
+const RADIUS_PRIOR_M: [f64; 2] = [0.04, 0.04];
+/// Maximum number of posts of a plan.
+pub(crate) const MAX_POSTS: usize = 8;
+/// Maximum number of candidates scored and, of these, refined by the likelihood.
+const MAX_CANDIDATES: usize = 40;
+const MAX_REFINED: usize = 3;
+/// Minimum number of sweeps with arcs of a candidate: a single arc fits a post of any radius.
+const MIN_SWEEPS: usize = 2;
+/// Gates of an arc of a candidate: range in metres and bearing in radians, more for a cut one.
+const GATE_M: f64 = 0.02;
+const GATE_RAD: [f64; 2] = [0.09, 0.26];
+/// Standard deviation of the range of an arc in the fit of a candidate, metres.
+const SIGMA_M: f64 = 0.004;
+/// Residuals beyond so many standard deviations count linearly.
+const ROBUST: f64 = 2.0;
+/// Minimum distance from the surface of a post to a pose and to a wall, metres.
+const CLEAR_M: [f64; 2] = [0.05, 0.01];
+/// Distance of centres within which candidates are the same, metres.
+const SAME_M: f64 = 0.02;
+/// Standard deviation of ranges in the comparison of candidates, metres.
+const ROUGH_SIGMA_M: f64 = 0.012;
+/// Steps of the fine search, metres.
+const FINE_M: [f64; 2] = [0.006, 0.002];
+/// Maximum length of a wall that may be drawn at the echoes of posts, metres.
+const SHORT_M: f64 = 1.0;
+/// Minimum radius of a round post in its standard deviations.
+const ROUND: f64 = 2.0;
+/// Minimum gain of a post, nats.
+const MIN_GAIN: f64 = 1.0;
+
+/// Plan with posts at arcs that its long walls leave unexplained, if the likelihood gains.
+///
+/// Walls drawn at the echoes of posts hide them, so that short walls are removed first, and return
+/// where they still gain.
+pub(crate) fn with_new_posts<'a>(
+    posed: &PosedPlan,
+    judge: &Judge,
+    kind: PostKind,
+    left_by: impl Fn(&PosedPlan) -> Vec<&'a Arc>,
+) -> Option<PosedPlan> {
+    let score =
+        |of: &PosedPlan| judge.with_posts(&of.posts).score_segments(&of.plan.segments(&of.walls));
+    let before = score(posed);
+    let mut grown = posed.without_short_walls(SHORT_M);
+    while grown.posts.len() < MAX_POSTS {
+        let posts = candidates(&grown, kind, &left_by(&grown));
+        let Some(post) = best_post(&grown, &judge.with_posts(&grown.posts), posts) else { break };
+        grown.posts.push(post);
+    }
+    if grown.posts.len() == posed.posts.len() {
+        return None;
+    }
+    let mut best = score(&grown);
+    let mut dropped = posed.plan.runs(&posed.walls);
+    dropped.retain(|run| posed.plan.segment(run).length_m() < SHORT_M);
+    dropped.sort_by(|a, b| {
+        posed.plan.segment(b).length_m().total_cmp(&posed.plan.segment(a).length_m())
+    });
+    for run in dropped {
+        let mut with = grown.clone();
+        with.set_run(&run, true);
+        let walls = [with.plan.segment(&run)];
+        if with.posts.iter().all(|post| post.is_clear_of(&walls)) {
+            let gained = score(&with);
+            if gained > best {
+                (grown, best) = (with, gained);
+            }
+        }
+    }
+    (best > before + MIN_GAIN).then_some(grown)
+}
+
+/// Post of several that adds most to the likelihood of a plan, if it pays.
+fn best_post(posed: &PosedPlan, judge: &Judge, posts: Vec<PostShape>) -> Option<PostShape> {
+    let before = judge.score_segments(&posed.plan.segments(&posed.walls));
+    let rough = judge.with_sigma(judge.workspace.errors.sigma_m(ROUGH_SIGMA_M));
+    let mut scored = scored(posts, posed, &rough);
+    scored.truncate(MAX_REFINED);
+    let found = scored.into_iter().map(|(_, post)| fine(post, posed, judge));
+    let (score, post) = found.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (score > before + MIN_GAIN).then_some(post)
+}
+
+/// Plan without the posts that do not gain their price; `None` if all of them do.
+pub(crate) fn without_idle_posts(posed: &PosedPlan, judge: &Judge) -> Option<PosedPlan> {
+    let walls = posed.plan.segments(&posed.walls);
+    let mut kept = posed.clone();
+    let mut score = judge.with_posts(&kept.posts).score_segments(&walls);
+    for at in (0..posed.posts.len()).rev() {
+        let mut fewer = kept.clone();
+        fewer.posts.remove(at);
+        let without = judge.with_posts(&fewer.posts).score_segments(&walls);
+        if without > score - MIN_GAIN {
+            (kept, score) = (fewer, without);
+        }
+    }
+    (kept.posts.len() < posed.posts.len()).then_some(kept)
+}
+
+/// Loss of score without each post, others unchanged, nats.
+pub(crate) fn evidence_nats(posed: &PosedPlan, judge: &Judge) -> Vec<f64> {
+    let walls = posed.plan.segments(&posed.walls);
+    let score = judge.score_segments(&walls);
+    let of = |at: usize| {
+        let mut fewer = posed.posts.clone();
+        fewer.remove(at);
+        score - judge.with_posts(&fewer).score_segments(&walls)
+    };
+    (0..posed.posts.len()).map(of).collect()
+}
+
+/// Posts on which unexplained arcs of several sweeps agree, those of most beams first.
+fn candidates(posed: &PosedPlan, kind: PostKind, left: &[&Arc]) -> Vec<PostShape> {
+    let seed = |arc: &&Arc| {
+        let pose = &posed.poses[arc.sweep];
+        let radius_m = RADIUS_PRIOR_M[0];
+        let center = pose.point_at(arc.azimuth_deg, arc.range_m + radius_m);
+        fitted(PostShape { center, radius_m }, left, &posed.poses)
+    };
+    let mut found: Vec<FittedPost> = left.iter().filter_map(seed).collect();
+    found.retain(|of| kind == PostKind::Any || of.post.radius_m > ROUND * of.sigma_radius_m);
+    found.sort_by_key(|of| std::cmp::Reverse(of.beams));
+    let mut distinct: Vec<PostShape> = Vec::new();
+    for FittedPost { post, .. } in found {
+        let is_same = |known: &PostShape| known.center.distance(post.center) < SAME_M;
+        if !distinct.iter().any(is_same) {
+            distinct.push(post);
+        }
+    }
+    distinct.truncate(MAX_CANDIDATES);
+    distinct
+}
+
+/// Post fitted to arcs.
+struct FittedPost {
+    post: PostShape,
+    /// Standard deviation of the radius, metres.
+    sigma_radius_m: f64,
+    /// Number of beams of the arcs.
+    beams: usize,
+}
+
+/// Post fitted to the arcs that agree with it; `None` if too few sweeps have such arcs.
+///
+/// The range of the echo is `|c - p| - r`, the bearing that of the centre `c`.
+fn fitted(seed: PostShape, left: &[&Arc], poses: &[Pose]) -> Option<FittedPost> {
+    const STEPS: usize = 6;
+    let (mut post, mut sigma_radius_m) = (seed, f64::INFINITY);
+    let mut own: Vec<&Arc> = Vec::new();
+    for step in 0..STEPS {
+        // The radius is unknown at first.
+        let gate_m = if step < 2 { GATE_M + RADIUS_PRIOR_M[1] } else { GATE_M };
+        own = left.iter().copied().filter(|arc| post.agrees(arc, poses, gate_m)).collect();
+        let mut normal = NormalEquations::new(3);
+        for arc in &own {
+            let pose = &poses[arc.sweep];
+            let to = post.center - pose.position();
+            let distance_m = to.length().max(1e-6);
+            let axis = to / distance_m;
+            let off_m = arc.range_m - (distance_m - post.radius_m);
+            let row = [(0, axis.x), (1, axis.y), (2, -1.0)];
+            normal.add(&row, off_m, arc.errors.sigma_m(SIGMA_M), ROBUST);
+            let across = axis.perp() / distance_m;
+            let off_rad = wrap_pi(pose.direction_rad(arc.azimuth_deg) - to.to_angle());
+            let sigma_rad = arc.sigma_deg().to_radians();
+            normal.add(&[(0, across.x), (1, across.y)], off_rad, sigma_rad, ROBUST);
+        }
+        let [mean_m, sigma_m] = RADIUS_PRIOR_M;
+        normal.add(&[(2, 1.0)], mean_m - post.radius_m, sigma_m, 1e3);
+        let by = normal.step(1e-6)?;
+        post = post.moved([by[0], by[1], by[2]]);
+        sigma_radius_m = normal.covariance()?[(2, 2)].sqrt();
+    }
+    let mut sweeps: Vec<usize> = own.iter().map(|arc| arc.sweep).collect();
+    sweeps.sort_unstable();
+    sweeps.dedup();
+    let beams = own.iter().map(|arc| arc.beams.len()).sum();
+    let is_agreed = sweeps.len() >= MIN_SWEEPS && post.center.is_finite();
+    is_agreed.then_some(FittedPost { post, sigma_radius_m, beams })
+}
+
+/// Post improved by steps that become smaller, with the score of the plan.
+fn fine(from: PostShape, posed: &PosedPlan, judge: &Judge) -> (f64, PostShape) {
+    const MAX_STEPS: usize = 3;
+    let mut best = from;
+    for step_m in FINE_M {
+        let own = judge.with_sigma(judge.sigma_m.max(0.5 * step_m));
+        let mut score = score_of(&best, posed, &own).unwrap_or(f64::NEG_INFINITY);
+        for _ in 0..MAX_STEPS {
+            let moved = (0..6).map(|at| {
+                let mut by = [0.0; 3];
+                by[at / 2] = if at % 2 == 0 { step_m } else { -step_m };
+                best.moved(by)
+            });
+            let tried = scored(moved.collect(), posed, &own);
+            let Some((gained, post)) = tried.into_iter().next().filter(|of| of.0 > score) else {
+                break;
+            };
+            (score, best) = (gained, post);
+        }
+    }
+    (score_of(&best, posed, judge).unwrap_or(f64::NEG_INFINITY), best)
+}
+
+/// Valid posts with the scores of the plan with each, the best first.
+fn scored(posts: Vec<PostShape>, posed: &PosedPlan, judge: &Judge) -> Vec<(f64, PostShape)> {
+    let mut found: Vec<(f64, PostShape)> = posts
+        .into_par_iter()
+        .filter_map(|post| Some((score_of(&post, posed, judge)?, post)))
+        .collect();
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found
+}
+
+fn score_of(post: &PostShape, posed: &PosedPlan, judge: &Judge) -> Option<f64> {
+    let walls = posed.plan.segments(&posed.walls);
+    let with = || [&posed.posts[..], &[*post]].concat();
+    post.is_clear(&walls, posed).then(|| judge.with_posts(&with()).score_segments(&walls))
+}
+
+/// Price of posts, nats.
+pub(crate) fn price(posts: &[PostShape]) -> f64 {
+    POST_NATS * posts.len() as f64
+}
+
+impl PostShape {
+    /// Post moved by metres in x, y and radius, the radius within its limits.
+    pub(crate) fn moved(&self, [x_m, y_m, by_m]: [f64; 3]) -> Self {
+        let radius_m = (self.radius_m + by_m).clamp(RADIUS_M[0], RADIUS_M[1]);
+        Self { center: self.center + DVec2::new(x_m, y_m), radius_m }
+    }
+
+    /// Returns `true` if range and middle of an arc agree with an echo from the surface.
+    fn agrees(&self, arc: &Arc, poses: &[Pose], gate_m: f64) -> bool {
+        let pose = &poses[arc.sweep];
+        let to = self.center - pose.position();
+        let off_m = arc.range_m - (to.length() - self.radius_m);
+        let off_rad = wrap_pi(pose.direction_rad(arc.azimuth_deg) - to.to_angle());
+        off_m.abs() < arc.errors.gate_m(gate_m) && off_rad.abs() < GATE_RAD[usize::from(arc.is_cut)]
+    }
+
+    /// Returns `true` if no pose, wall or other post is inside or at the surface.
+    fn is_clear(&self, walls: &[Segment], posed: &PosedPlan) -> bool {
+        let from_pose_m = self.radius_m + CLEAR_M[0];
+        let is_free = |other: &PostShape| {
+            other.center.distance(self.center) > self.radius_m + CLEAR_M[1] + other.radius_m
+        };
+        posed.poses.iter().all(|pose| pose.position().distance(self.center) > from_pose_m)
+            && self.is_clear_of(walls)
+            && posed.posts.iter().all(is_free)
+    }
+
+    /// Returns `true` if no wall is inside or at the surface.
+    fn is_clear_of(&self, walls: &[Segment]) -> bool {
+        let clear_m = self.radius_m + CLEAR_M[1];
+        walls.iter().all(|of| distance_to_segment(self.center, of.a, of.b) > clear_m)
+    }
+}
