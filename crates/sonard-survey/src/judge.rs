@@ -18,7 +18,7 @@ use sonard_model::{
 use crate::{
     arrangement::{LineArrangement, PieceSet, Segment, free_ends},
     posed::PosedPlan,
-    posts::{self, PostShape},
+    post::PostShape,
     readings::{Beam, Outcome, Readings},
     square::oblique_price,
     workspace::Workspace,
@@ -36,7 +36,7 @@ const FREE_END_NATS: f64 = 2.0;
 const LENGTH_NATS_PER_M: f64 = 0.5;
 /// Price of a post, nats: that of a wall and, for each of its three numbers, half that of a line,
 /// which has two. A single arc that it explains gains about as much.
-pub(crate) const POST_NATS: f64 = 10.0;
+const POST_NATS: f64 = 10.0;
 /// Step of directions in which readings are predicted for all headings, degrees: at most half of
 /// the step of a coarse ranger's beams.
 const DIRECTION_STEP_DEG: f64 = 1.5;
@@ -166,7 +166,7 @@ impl<'a> Judge<'a> {
 
     /// Score, or an upper bound of it that does not exceed `floor`, nats.
     fn score_segments_above(&self, segments: &[Segment], floor: f64) -> Result<f64, f64> {
-        let price = price(segments) + posts::price(&self.posts);
+        let price = price(segments) + POST_NATS * self.posts.len() as f64;
         let oblique = self.oblique_nats(segments);
         let priced = |nats: f64| nats - price - oblique;
         let nats = self.log_likelihood_above(segments, floor + price + oblique);

@@ -32,6 +32,7 @@ mod options;
 mod polish;
 mod pose_grid;
 mod posed;
+mod post;
 mod posts;
 mod progress;
 mod range_errors;
@@ -59,7 +60,7 @@ pub use error::SurveyError;
 pub use feature::VirtualFeature;
 pub use odometry::OdometrySigma;
 pub use options::SurveyOptions;
-pub use posts::PostShape;
+pub use post::PostShape;
 pub use progress::{NoObserver, SurveyObserver, SurveyProgress, SurveyStage};
 pub use result::{
     AlternativePlan, PieceStatus, ReadingCause, SearchEnd, Survey, SurveyedEnd, SurveyedPose,

@@ -6,7 +6,7 @@ use crate::{
     arrangement::{LineArrangement, PieceSet, Run},
     line::{off_square_rad, square_axis},
     normal::NormalEquations,
-    posts::PostShape,
+    post::PostShape,
     square::MAX_OFF_RAD,
 };
 

@@ -1,37 +1,28 @@
 //! Posts: upright cylinders such as table legs, found from arcs that the walls leave unexplained.
 
 use rayon::prelude::*;
-use sonard_model::geometry::{DVec2, Pose, distance_to_segment, wrap_pi};
+use sonard_model::geometry::{Pose, wrap_pi};
 
 use crate::{
     arc::Arc,
     arrangement::Segment,
-    judge::{Judge, POST_NATS},
+    judge::Judge,
     normal::NormalEquations,
     posed::PosedPlan,
+    post::{CLEAR_M, PostShape},
 };
 
-/// Upright cylinder of a plan.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PostShape {
-    /// Axis, metres.
-    pub center: DVec2,
-    /// Radius, metres.
-    pub radius_m: f64,
-}
-
-/// Posts that are looked for.
+/// Posts that a round adds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum PostKind {
-    /// Those that differ from a corner or an edge, which have the echoes of a post without a
-    /// radius: as long as walls are missing.
+    /// Posts whose radius distinguishes them from a corner or an edge: while walls are missing,
+    /// the echoes of a corner are those of a post without a radius.
     Round,
+    /// All posts.
     Any,
 }
 
-/// Limits of the radius of a post, metres.
-pub(crate) const RADIUS_M: [f64; 2] = [0.004, 0.15];
-/// Prior of the radius of a candidate, mean and standard deviation, metres: legs and columns.
+/// Mean and standard deviation of the prior of a candidate's radius, metres: legs and columns.
 const RADIUS_PRIOR_M: [f64; 2] = [0.04, 0.04];
 /// Maximum number of posts of a plan.
 pub(crate) const MAX_POSTS: usize = 8;
@@ -47,8 +38,8 @@ const GATE_RAD: [f64; 2] = [0.09, 0.26];
 const SIGMA_M: f64 = 0.004;
 /// Residuals beyond so many standard deviations count linearly.
 const ROBUST: f64 = 2.0;
-/// Minimum distance from the surface of a post to a pose and to a wall, metres.
-const CLEAR_M: [f64; 2] = [0.05, 0.01];
+/// Minimum distance from the surface of a post to a pose, metres.
+const CLEAR_OF_POSES_M: f64 = 0.05;
 /// Distance of centres within which candidates are the same, metres.
 const SAME_M: f64 = 0.02;
 /// Standard deviation of ranges in the comparison of candidates, metres.
@@ -184,7 +175,7 @@ fn fitted(seed: PostShape, left: &[&Arc], poses: &[Pose]) -> Option<FittedPost> 
     for step in 0..STEPS {
         // The radius is unknown at first.
         let gate_m = if step < 2 { GATE_M + RADIUS_PRIOR_M[1] } else { GATE_M };
-        own = left.iter().copied().filter(|arc| post.agrees(arc, poses, gate_m)).collect();
+        own = left.iter().copied().filter(|arc| agrees(&post, arc, poses, gate_m)).collect();
         let mut normal = NormalEquations::new(3);
         for arc in &own {
             let pose = &poses[arc.sweep];
@@ -249,44 +240,25 @@ fn scored(posts: Vec<PostShape>, posed: &PosedPlan, judge: &Judge) -> Vec<(f64, 
 fn score_of(post: &PostShape, posed: &PosedPlan, judge: &Judge) -> Option<f64> {
     let walls = posed.plan.segments(&posed.walls);
     let with = || [&posed.posts[..], &[*post]].concat();
-    post.is_clear(&walls, posed).then(|| judge.with_posts(&with()).score_segments(&walls))
+    is_clear(post, &walls, posed).then(|| judge.with_posts(&with()).score_segments(&walls))
 }
 
-/// Price of posts, nats.
-pub(crate) fn price(posts: &[PostShape]) -> f64 {
-    POST_NATS * posts.len() as f64
+/// Returns `true` if range and middle of an arc agree with an echo from the surface.
+fn agrees(post: &PostShape, arc: &Arc, poses: &[Pose], gate_m: f64) -> bool {
+    let pose = &poses[arc.sweep];
+    let to = post.center - pose.position();
+    let off_m = arc.range_m - (to.length() - post.radius_m);
+    let off_rad = wrap_pi(pose.direction_rad(arc.azimuth_deg) - to.to_angle());
+    off_m.abs() < arc.errors.gate_m(gate_m) && off_rad.abs() < GATE_RAD[usize::from(arc.is_cut)]
 }
 
-impl PostShape {
-    /// Post moved by metres in x, y and radius, the radius within its limits.
-    pub(crate) fn moved(&self, [x_m, y_m, by_m]: [f64; 3]) -> Self {
-        let radius_m = (self.radius_m + by_m).clamp(RADIUS_M[0], RADIUS_M[1]);
-        Self { center: self.center + DVec2::new(x_m, y_m), radius_m }
-    }
-
-    /// Returns `true` if range and middle of an arc agree with an echo from the surface.
-    fn agrees(&self, arc: &Arc, poses: &[Pose], gate_m: f64) -> bool {
-        let pose = &poses[arc.sweep];
-        let to = self.center - pose.position();
-        let off_m = arc.range_m - (to.length() - self.radius_m);
-        let off_rad = wrap_pi(pose.direction_rad(arc.azimuth_deg) - to.to_angle());
-        off_m.abs() < arc.errors.gate_m(gate_m) && off_rad.abs() < GATE_RAD[usize::from(arc.is_cut)]
-    }
-
-    /// Returns `true` if no pose, wall or other post is inside or at the surface.
-    fn is_clear(&self, walls: &[Segment], posed: &PosedPlan) -> bool {
-        let from_pose_m = self.radius_m + CLEAR_M[0];
-        let is_free = |other: &PostShape| {
-            other.center.distance(self.center) > self.radius_m + CLEAR_M[1] + other.radius_m
-        };
-        posed.poses.iter().all(|pose| pose.position().distance(self.center) > from_pose_m)
-            && self.is_clear_of(walls)
-            && posed.posts.iter().all(is_free)
-    }
-
-    /// Returns `true` if no wall is inside or at the surface.
-    fn is_clear_of(&self, walls: &[Segment]) -> bool {
-        let clear_m = self.radius_m + CLEAR_M[1];
-        walls.iter().all(|of| distance_to_segment(self.center, of.a, of.b) > clear_m)
-    }
+/// Returns `true` if no pose, wall or other post is inside or at the surface.
+fn is_clear(post: &PostShape, walls: &[Segment], posed: &PosedPlan) -> bool {
+    let from_pose_m = post.radius_m + CLEAR_OF_POSES_M;
+    let is_free = |other: &PostShape| {
+        other.center.distance(post.center) > post.radius_m + CLEAR_M + other.radius_m
+    };
+    posed.poses.iter().all(|pose| pose.position().distance(post.center) > from_pose_m)
+        && post.is_clear_of(walls)
+        && posed.posts.iter().all(is_free)
 }
