@@ -372,7 +372,12 @@ impl<'a> SurveySearch<'a> {
     }
 
     /// Adds posts at unexplained arcs as long as they gain, and removes those that do not pay.
+    ///
+    /// Arcs of a coarse ranger, of which many remain unexplained, do not determine a radius.
     fn add_posts(&mut self, number: usize) {
+        if self.errors().is_coarse() {
+            return;
+        }
         let round = &ROUNDS[number.min(ROUNDS.len() - 1)];
         let sigma_m = self.errors().sigma_m(round.sigma_m);
         let gate_m = self.errors().gate_m(round.gate_m);
