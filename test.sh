@@ -69,6 +69,12 @@ check_tools() {
     for program in curl rsync; do command -v "$program" >/dev/null || needed+=("$program"); done
     if [ ${#needed[@]} != 0 ]; then tests/install.sh "" "${needed[@]}"; fi
   fi
+  local free_gb
+  free_gb=$(df -Pk "$(mkdir -p "${CARGO_TARGET_DIR:-target}" && cd "${CARGO_TARGET_DIR:-target}" && pwd)" | awk 'END {printf "%d", $4 / 1048576}')
+  printf '%s GB of disk are free; a first run takes 8 GB\n' "$free_gb"
+  if [ "$free_gb" -lt 2 ]; then
+    fail "the disk is nearly full: remove target folders (cargo clean), or set CARGO_TARGET_DIR to a folder on another disk"
+  fi
   case $runner in
   nextest) printf 'tests are run by cargo-nextest: %s\n' "$(cargo nextest --version | head -n 1)" ;;
   cargo) printf 'tests are run by cargo test; cargo-nextest, which is not installed, would run them side by side\n' ;;

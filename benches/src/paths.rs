@@ -340,7 +340,7 @@ fn standing_places(middle: DVec2, count: usize) -> Vec<DVec2> {
 }
 
 fn plan_scene(walls: Vec<(DVec2, DVec2)>) -> Scene {
-    let material = Material { reflectance: 0.97, roughness: 0.0 };
+    let material = Material::smooth(0.97);
     let wall = |(i, (a, b)): (usize, (DVec2, DVec2))| Wall {
         id: Arc::from(format!("w{i}")),
         a,

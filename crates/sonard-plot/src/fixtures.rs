@@ -19,7 +19,7 @@ use sonard_records::{
 
 const WIDTH_M: f64 = 0.928;
 const HEIGHT_M: f64 = 0.742;
-const SHELVING: Material = Material { reflectance: 0.98, roughness: 0.0 };
+const SHELVING: Material = Material::smooth(0.98);
 
 /// Rigid room of Dudek, Jenkin, Milios and Wilkes, figures 7 to 9.
 pub(super) fn room() -> Scene {

@@ -40,7 +40,7 @@ pub(crate) fn empty_world(world: &World, reflectance: f64) -> World {
     scene.walls.clear();
     scene.cylinders.clear();
     scene.robot = None;
-    scene.materials = [("wall".to_owned(), Material { reflectance, roughness: 0.0 })].into();
+    scene.materials = [("wall".to_owned(), Material::smooth(reflectance))].into();
     world.scene = Arc::new(scene);
     // Rounded predictions have no derivatives; the step is part of the errors of ranges.
     world.sensor.range_step_m = 0.0;

@@ -36,12 +36,12 @@ fn shipped_scene(name: &str) -> Scene {
 }
 
 fn wall(id: &str, a: (f64, f64), b: (f64, f64), reflectance: f64) -> Wall {
-    let material = Material { reflectance, roughness: 0.0 };
+    let material = Material::smooth(reflectance);
     Wall { id: id.into(), a: a.into(), b: b.into(), material, z_m: None }
 }
 
 fn cylinder(center: (f64, f64), radius_m: f64) -> Cylinder {
-    let material = Material { reflectance: 1.0, roughness: 0.0 };
+    let material = Material::RIGID;
     Cylinder { id: "post".into(), center: center.into(), radius_m, material, z_m: None }
 }
 

@@ -27,7 +27,13 @@ pub enum MaterialProperty {
 
 impl Material {
     /// Perfectly reflecting, smooth surface.
-    pub const RIGID: Self = Self { reflectance: 1.0, roughness: 0.0 };
+    pub const RIGID: Self = Self::smooth(1.0);
+
+    /// Smooth surface with this amplitude reflectance, 0 to 1.
+    #[must_use]
+    pub const fn smooth(reflectance: f64) -> Self {
+        Self { reflectance, roughness: 0.0 }
+    }
 
     /// Amplitude of the mirror reflection relative to the incident wave: a rough surface scatters a
     /// share of the energy that it does not absorb.

@@ -29,7 +29,7 @@ fn polylines_become_segments() {
     let closing = &scene.walls[6];
     assert_eq!((closing.a, closing.b), (DVec2::new(2.0, 2.0), DVec2::new(1.0, 1.0)));
     assert_eq!(closing.z_m, Some([0.0, 1.0]));
-    assert_eq!(scene.walls[0].material, Material { reflectance: 0.9, roughness: 0.0 });
+    assert_eq!(scene.walls[0].material, Material::smooth(0.9));
     assert_eq!((scene.floor_z_m, scene.ceiling_z_m), (Some(0.0), Some(2.5)));
     assert_eq!([scene.floor_material, scene.ceiling_material], [Material::RIGID; 2]);
     let with_carpet =

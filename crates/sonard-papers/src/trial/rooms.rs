@@ -14,7 +14,7 @@ use sonard_model::{
 pub fn random_room(name: &str, boxes: usize, partitions: usize, rng: &mut impl Rng) -> Scene {
     let size = DVec2::new(rng.random_range(3.5..6.5), rng.random_range(3.0..5.0));
     let turn = DVec2::from_angle(rng.random_range(-0.4..0.4));
-    let material = Material { reflectance: rng.random_range(0.9..0.98), roughness: 0.0 };
+    let material = Material::smooth(rng.random_range(0.9..0.98));
     let start = DVec2::new(0.7, 0.7);
     let mut room = RoomBuilder::new(size, start);
     room.add_boxes(boxes, [0.15, 0.4], 0.6, rng);
@@ -39,7 +39,7 @@ pub fn random_room(name: &str, boxes: usize, partitions: usize, rng: &mut impl R
 pub fn gallery(name: &str, rng: &mut impl Rng) -> Scene {
     let size = DVec2::new(rng.random_range(6.0..8.0), rng.random_range(5.0..6.5));
     let turn = DVec2::from_angle(rng.random_range(-0.4..0.4));
-    let material = Material { reflectance: rng.random_range(0.9..0.98), roughness: 0.0 };
+    let material = Material::smooth(rng.random_range(0.9..0.98));
     let mut room = RoomBuilder::new(size, DVec2::new(1.1, 1.0));
     let boxes = rng.random_range(2..=3);
     room.add_boxes(boxes, [0.25, 0.6], 1.1, rng);

@@ -174,6 +174,9 @@ fn tag(text: &str) -> String {
 mod tests {
     use super::*;
 
+    /// Maximum size of all files of the page, bytes.
+    const MAX_PAGE_BYTES: usize = 250_000;
+
     #[test]
     fn all_files_are_served() {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/src/server/page");
@@ -186,7 +189,10 @@ mod tests {
         served.sort_unstable();
         assert_eq!(names, served);
         let bytes: usize = ASSETS.iter().map(|asset| asset.text.len()).sum();
-        assert!(bytes < 250_000, "the page is {bytes} bytes");
+        assert!(
+            bytes < MAX_PAGE_BYTES,
+            "the page is {bytes} bytes, more than {MAX_PAGE_BYTES}: it is loaded over slow radio links"
+        );
     }
 
     #[test]

@@ -122,7 +122,7 @@ impl World {
     }
 
     fn simulator(&self) -> Simulator {
-        let material = Material { reflectance: 0.98, roughness: 0.0 };
+        let material = Material::smooth(0.98);
         let wall = |(i, &(a, b)): (usize, &(DVec2, DVec2))| Wall {
             id: format!("wall-{i}").into(),
             a,

@@ -70,7 +70,7 @@ fn scene(walls: &[[f64; 4]]) -> Scene {
         id: Arc::from(format!("w{i}")),
         a: DVec2::new(ax, ay),
         b: DVec2::new(bx, by),
-        material: Material { reflectance: 1.0, roughness: 0.0 },
+        material: Material::RIGID,
         z_m: None,
     };
     Scene {

@@ -110,7 +110,7 @@ fn duplicate_and_split_walls() {
 #[test]
 fn material_ignores_order() {
     let (mut walls, at) = room();
-    let soft = Material { reflectance: 0.2, roughness: 0.0 };
+    let soft = Material::smooth(0.2);
     walls.push(Wall { id: "curtain".into(), material: soft, ..walls[0].clone() });
     let one = readings(&scene(walls.clone()), at, EngineKind::Paths);
     walls.reverse();

@@ -9,7 +9,7 @@ use super::*;
 use crate::{model::Reflector, scene::Cylinder};
 
 fn body(center: DVec2, radius_m: f64) -> Cylinder {
-    let material = Material { reflectance: 1.0, roughness: 0.0 };
+    let material = Material::RIGID;
     Cylinder { id: Arc::from("body"), center, radius_m, material, z_m: None }
 }
 

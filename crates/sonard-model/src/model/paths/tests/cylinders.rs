@@ -14,7 +14,7 @@ fn cylinder(x: f64, y: f64, radius_m: f64) -> Cylinder {
         id: Arc::from("round"),
         center: DVec2::new(x, y),
         radius_m,
-        material: Material { reflectance: 1.0, roughness: 0.0 },
+        material: Material::RIGID,
         z_m: None,
     }
 }

@@ -106,7 +106,7 @@ fn images_by_the_floor() {
     let (d, top) = (0.9, 0.35);
     let mut room = scene(&[[-40.0, 0.0, 40.0, 0.0]]);
     room.floor_z_m = Some(0.0);
-    room.floor_material = Material { reflectance: 0.8, roughness: 0.0 };
+    room.floor_material = Material::smooth(0.8);
     room.walls[0].z_m = Some([0.0, top]);
     let at = DVec2::new(0.3, -d);
     for z_m in [0.1, 0.34, 0.6, 1.1] {
@@ -200,7 +200,7 @@ fn furnished() -> Scene {
         [-1.2, -0.8, -1.1, 0.6],
     ]);
     (room.floor_z_m, room.ceiling_z_m) = (Some(0.0), Some(2.3));
-    room.floor_material = Material { reflectance: 0.9, roughness: 0.0 };
+    room.floor_material = Material::smooth(0.9);
     for (wall, limits) in [(4, [0.0, 0.41]), (5, [0.37, 1.2]), (6, [1.1, 2.3])] {
         room.walls[wall].z_m = Some(limits);
     }

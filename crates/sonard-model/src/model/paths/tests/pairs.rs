@@ -18,7 +18,7 @@ fn plan() -> Scene {
         id: Arc::from("round"),
         center: DVec2::new(1.9, 0.6),
         radius_m: 0.3,
-        material: Material { reflectance: 1.0, roughness: 0.0 },
+        material: Material::RIGID,
         z_m: None,
     }];
     plan

@@ -8,7 +8,7 @@ use super::*;
 use crate::{acoustics::edge::post::series, scene::Cylinder};
 
 fn post(center: DVec2, radius_m: f64) -> Cylinder {
-    let material = Material { reflectance: 1.0, roughness: 0.0 };
+    let material = Material::RIGID;
     Cylinder { id: Arc::from("leg"), center, radius_m, material, z_m: None }
 }
 
