@@ -28,7 +28,10 @@ pub(crate) fn refine(
     steps: usize,
 ) -> Option<PlanCovariance> {
     const SHARES: [f64; 3] = [1.0, 0.5, 0.2];
-    let mut best = judge.at(posed).score_segments(&posed.plan.segments(&posed.walls));
+    // From the judge's poses: a coarse ranger's may have moved since, by less than lines and poses
+    // together can gain later.
+    let own = judge.with_posts(&posed.posts);
+    let mut best = own.score_segments(&posed.plan.segments(&posed.walls));
     for _ in 0..2 {
         let mut far = posed.clone();
         for _ in 0..steps {
