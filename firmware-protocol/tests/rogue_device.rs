@@ -5,8 +5,8 @@ mod rogue;
 
 use firmware_protocol::frame::Header;
 use firmware_protocol::host::{
-    ATTEMPTS, Command, HostError, HostEvent, IdentityFault, OVERRUNS, ReadingFault, ReplyFault,
-    STOP_ATTEMPTS, StartError,
+    ATTEMPTS, Command, HostError, HostEvent, IdentityFault, OVERRUNS, Outcome, ReadingFault,
+    ReplyFault, STOP_ATTEMPTS, StartError,
 };
 use firmware_protocol::messages::{
     Alive, Capabilities, Echoes, FaultKind, Identity, NakReason, Reading, ReadingStatus, Reply,
@@ -303,6 +303,50 @@ fn endless_home_is_overrun() {
     // Two revolutions take 0.825 s at these settings.
     let took_us = rogue.now_us - began_us;
     assert!((2_400_000..8_000_000).contains(&took_us), "{took_us} us");
+}
+
+/// The line loses all but the last of the permitted transmissions, and then the final reply.
+#[test]
+fn started_renews_attempts() {
+    let mut rogue = RogueDevice::homed();
+    rogue.begin(Command::Home);
+    for _ in 1..ATTEMPTS {
+        assert!(rogue.wait());
+    }
+    rogue.reply(Reply::Started);
+    let before = rogue.requests.len();
+    for _ in 0..ATTEMPTS {
+        assert!(rogue.wait());
+    }
+    assert_eq!(rogue.requests.len() - before, usize::from(ATTEMPTS));
+    assert!(rogue.requests[before..].iter().all(|(_, request)| *request == Request::Home));
+    rogue.reply(Reply::Homed { drift_steps: 0 });
+    assert_eq!(rogue.events, [HostEvent::Done(Outcome::Homed { drift_steps: 0 })]);
+}
+
+#[test]
+fn silence_after_started_is_no_answer() {
+    let mut rogue = RogueDevice::homed();
+    rogue.begin(Command::Home);
+    rogue.reply(Reply::Started);
+    let before = rogue.requests.len();
+    let error = run_to_failure(&mut rogue, |rogue| assert!(rogue.wait()));
+    assert_eq!(error, HostError::NoAnswer { attempts: ATTEMPTS });
+    let repeated =
+        rogue.requests[before..].iter().filter(|(_, request)| *request == Request::Home).count();
+    assert_eq!(repeated, usize::from(ATTEMPTS));
+}
+
+#[test]
+fn renumbering_keeps_overruns() {
+    let mut rogue = RogueDevice::homed();
+    rogue.begin(Command::Home);
+    let error = run_to_failure(&mut rogue, |rogue| {
+        rogue.reply(Reply::Started);
+        rogue.wait();
+        rogue.reply(Reply::Nak { reason: NakReason::SequenceReused });
+    });
+    assert!(matches!(error, HostError::Overrun { .. }), "{error:?}");
 }
 
 #[test]
