@@ -283,6 +283,35 @@ fn unanswered_stop_keeps_cause() {
     assert_eq!(rogue.events.last(), Some(&HostEvent::Failed(wrong)));
 }
 
+/// Sweep of which beam 5 is lost, then `losses` times sent again in vain.
+fn losing_beam_5(losses: u8) -> RogueDevice {
+    let mut rogue = RogueDevice::sweeping();
+    for index in (0..12).filter(|&index| index != 5) {
+        rogue.send_reading(rogue.reading(index));
+    }
+    // This Alive follows new readings, so it does not count.
+    assert!(matches!(rogue.last_request().1, Request::KeepAlive { .. }));
+    rogue.alive(12, SweepState::Complete);
+    for _ in 0..losses {
+        assert!(matches!(rogue.last_request().1, Request::Resend { first: 5, count: 1, .. }));
+        rogue.alive(12, SweepState::Complete);
+    }
+    rogue
+}
+
+#[test]
+fn lost_beam_is_requested_again() {
+    let mut rogue = losing_beam_5(ATTEMPTS);
+    rogue.send_reading(rogue.reading(5));
+    let end = rogue.events.last();
+    assert!(matches!(end, Some(HostEvent::SweepDone { delivered: 12, .. })), "{end:?}");
+
+    let mut rogue = losing_beam_5(ATTEMPTS + 1);
+    rogue.reply(Reply::Ack);
+    assert_eq!(rogue.events.last(), Some(&HostEvent::Failed(HostError::Stalled { fired: 12 })));
+    assert!(rogue.received_stop());
+}
+
 #[test]
 fn endless_home_is_overrun() {
     let mut rogue = RogueDevice::homed();
