@@ -319,7 +319,9 @@ fn check_cause(sim: &Sim, error: &HostError) {
         HostError::SweepLost
         | HostError::WrongReading { .. }
         | HostError::WrongVersion { .. }
-        | HostError::Rejected(NakReason::Busy) => panic!("no fault of the line causes {error:?}"),
+        | HostError::Rejected(NakReason::Busy | NakReason::NotConfigured) => {
+            panic!("no fault of the line causes {error:?}")
+        }
         _ => {}
     }
 }
