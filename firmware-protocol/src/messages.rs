@@ -21,7 +21,8 @@ pub use wire::{Reader, Wire, Writer};
 
 use table::wire_enum;
 
-/// Version of the protocol, incremented with every incompatible change.
+/// Version of the protocol, incremented with every change after which a host or device of the
+/// previous version would reject or misread a frame.
 pub const PROTOCOL_VERSION: u8 = 1;
 
 /// Protocol version and schema implemented by this crate.

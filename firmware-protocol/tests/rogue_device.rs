@@ -5,8 +5,8 @@ mod rogue;
 
 use firmware_protocol::frame::Header;
 use firmware_protocol::host::{
-    ATTEMPTS, Command, HostError, HostEvent, IdentityFault, OVERRUNS, ReadingFault, ReplyFault,
-    STOP_ATTEMPTS, StartError,
+    ATTEMPTS, Command, HostError, HostEvent, IdentityFault, OVERRUNS, Outcome, ReadingFault,
+    ReplyFault, STOP_ATTEMPTS, StartError,
 };
 use firmware_protocol::messages::{
     Alive, Capabilities, Echoes, FaultKind, Identity, NakReason, Reading, ReadingStatus, Reply,
@@ -283,6 +283,35 @@ fn unanswered_stop_keeps_cause() {
     assert_eq!(rogue.events.last(), Some(&HostEvent::Failed(wrong)));
 }
 
+/// Sweep of which beam 5 is lost, then `losses` times sent again in vain.
+fn losing_beam_5(losses: u8) -> RogueDevice {
+    let mut rogue = RogueDevice::sweeping();
+    for index in (0..12).filter(|&index| index != 5) {
+        rogue.send_reading(rogue.reading(index));
+    }
+    // This Alive follows new readings, so it does not count.
+    assert!(matches!(rogue.last_request().1, Request::KeepAlive { .. }));
+    rogue.alive(12, SweepState::Complete);
+    for _ in 0..losses {
+        assert!(matches!(rogue.last_request().1, Request::Resend { first: 5, count: 1, .. }));
+        rogue.alive(12, SweepState::Complete);
+    }
+    rogue
+}
+
+#[test]
+fn lost_beam_is_requested_again() {
+    let mut rogue = losing_beam_5(ATTEMPTS);
+    rogue.send_reading(rogue.reading(5));
+    let end = rogue.events.last();
+    assert!(matches!(end, Some(HostEvent::SweepDone { delivered: 12, .. })), "{end:?}");
+
+    let mut rogue = losing_beam_5(ATTEMPTS + 1);
+    rogue.reply(Reply::Ack);
+    assert_eq!(rogue.events.last(), Some(&HostEvent::Failed(HostError::Stalled { fired: 12 })));
+    assert!(rogue.received_stop());
+}
+
 #[test]
 fn endless_home_is_overrun() {
     let mut rogue = RogueDevice::homed();
@@ -303,6 +332,50 @@ fn endless_home_is_overrun() {
     // Two revolutions take 0.825 s at these settings.
     let took_us = rogue.now_us - began_us;
     assert!((2_400_000..8_000_000).contains(&took_us), "{took_us} us");
+}
+
+/// The line loses all but the last of the permitted transmissions, and then the final reply.
+#[test]
+fn started_renews_attempts() {
+    let mut rogue = RogueDevice::homed();
+    rogue.begin(Command::Home);
+    for _ in 1..ATTEMPTS {
+        assert!(rogue.wait());
+    }
+    rogue.reply(Reply::Started);
+    let before = rogue.requests.len();
+    for _ in 0..ATTEMPTS {
+        assert!(rogue.wait());
+    }
+    assert_eq!(rogue.requests.len() - before, usize::from(ATTEMPTS));
+    assert!(rogue.requests[before..].iter().all(|(_, request)| *request == Request::Home));
+    rogue.reply(Reply::Homed { drift_steps: 0 });
+    assert_eq!(rogue.events, [HostEvent::Done(Outcome::Homed { drift_steps: 0 })]);
+}
+
+#[test]
+fn silence_after_started_is_no_answer() {
+    let mut rogue = RogueDevice::homed();
+    rogue.begin(Command::Home);
+    rogue.reply(Reply::Started);
+    let before = rogue.requests.len();
+    let error = run_to_failure(&mut rogue, |rogue| assert!(rogue.wait()));
+    assert_eq!(error, HostError::NoAnswer { attempts: ATTEMPTS });
+    let repeated =
+        rogue.requests[before..].iter().filter(|(_, request)| *request == Request::Home).count();
+    assert_eq!(repeated, usize::from(ATTEMPTS));
+}
+
+#[test]
+fn renumbering_keeps_overruns() {
+    let mut rogue = RogueDevice::homed();
+    rogue.begin(Command::Home);
+    let error = run_to_failure(&mut rogue, |rogue| {
+        rogue.reply(Reply::Started);
+        rogue.wait();
+        rogue.reply(Reply::Nak { reason: NakReason::SequenceReused });
+    });
+    assert!(matches!(error, HostError::Overrun { .. }), "{error:?}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Golden frames: `vectors/<name>.txt` holds one sample of every message, in hex.
 //!
-//! `UPDATE_VECTORS=1 cargo test -p firmware-protocol --test vectors` regenerates them, which is
-//! correct only together with a new protocol version.
+//! `UPDATE_VECTORS=1 cargo test -p firmware-protocol --test vectors` renews them. A frame that
+//! changes although its sample does not also requires a new `PROTOCOL_VERSION`.
 
 mod samples;
 
@@ -11,6 +11,12 @@ use std::path::PathBuf;
 use firmware_protocol::frame::{Frame, FrameDecoder, Header, Received};
 use firmware_protocol::messages::{Reply, Request};
 use samples::{BOOT, SEQ, replies, requests};
+
+/// Instructions if the vectors differ from the code.
+const RENEW: &str = "if this is intended, renew the vectors with \
+    `UPDATE_VECTORS=1 cargo test -p firmware-protocol --test vectors`; if a host or device of the \
+    present version would reject or misread the new frame, also raise PROTOCOL_VERSION in \
+    firmware-protocol/src/messages.rs";
 
 fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("vectors")
@@ -67,8 +73,9 @@ fn frames_match_vectors() {
             std::fs::create_dir_all(folder()).expect("can make the folder");
             std::fs::write(&path, &text).expect("can write the vector");
         }
-        let golden = std::fs::read_to_string(&path).expect("the vector is there");
-        assert_eq!(golden, text, "{name} changed on the wire");
+        let golden = std::fs::read_to_string(&path);
+        let golden = golden.unwrap_or_else(|error| panic!("{name}: {error}: {RENEW}"));
+        assert_eq!(golden, text, "{name} changed on the wire: {RENEW}");
     }
 }
 

@@ -2,8 +2,8 @@
 
 use crate::messages::{Settings, Sweep};
 
-/// Transmissions of a request before the device counts as absent: about nine seconds, longer than a
-/// board needs to boot after a reset caused by opening its port.
+/// Transmissions of a request, without a reply, before the device counts as absent: about nine
+/// seconds, longer than a board needs to boot after a reset caused by opening its port.
 pub const ATTEMPTS: u8 = 7;
 /// Times that the expected duration of the work may pass while a device still replies Started.
 pub const OVERRUNS: u8 = 3;
@@ -32,7 +32,7 @@ pub struct HostConfig {
     pub baud: u32,
     /// Number that differs between runs: seed of sequence and sweep numbers.
     pub seed: u32,
-    /// Transmissions of a request before the device counts as absent.
+    /// Transmissions of a request, without a reply, before the device counts as absent.
     pub max_attempts: u8,
     /// Times that the expected duration of the work may pass while a device still replies Started.
     pub max_overruns: u8,

@@ -93,9 +93,9 @@ pub enum Outcome {
 /// Reason for the failure of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HostError {
-    /// No bytes were received.
+    /// No reply was received.
     NoAnswer {
-        /// Number of transmissions.
+        /// Number of transmissions since the device last replied Started, or in total.
         attempts: u8,
     },
     /// Bytes were received but no valid frame: another bit rate, or another device.
@@ -128,7 +128,8 @@ pub enum HostError {
     MotionFault,
     /// The device reports a stop that this host did not request.
     Stopped,
-    /// The device replies but makes no progress.
+    /// The device replies but no further reading arrives: it does not continue, or the line loses
+    /// every repetition of a beam.
     Stalled {
         /// Number of beams fired so far.
         fired: u16,
@@ -189,7 +190,10 @@ impl fmt::Display for HostError {
             Self::MotionFault => write!(formatter, "{}", FaultKind::MotionFault),
             Self::Stopped => formatter.write_str("the operation was stopped"),
             Self::Stalled { fired } => {
-                write!(formatter, "the device replies but makes no progress after {fired} beams")
+                write!(
+                    formatter,
+                    "the device replies but no further reading arrives; {fired} beams were fired"
+                )
             }
             Self::Overrun { waited_ms } => {
                 write!(

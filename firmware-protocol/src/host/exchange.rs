@@ -13,7 +13,10 @@ pub(super) struct OpenRequest {
     pub(super) seq: u16,
     /// Time of the first transmission, us.
     pub(super) sent_us: u64,
+    /// Transmissions in total.
     pub(super) attempts: u8,
+    /// Transmissions since the device last replied Started.
+    unanswered: u8,
     /// `true` after the device has replied Started.
     pub(super) started: bool,
     /// Number of times that the expected duration of the work has passed.
@@ -85,6 +88,7 @@ impl Host {
             seq,
             sent_us: now_us,
             attempts: 1,
+            unanswered: 1,
             started: false,
             overruns: 0,
             deadline_us: now_us,
@@ -107,11 +111,16 @@ impl Host {
         let Some(mut exchange) = self.exchange.take() else {
             return;
         };
-        exchange.overruns += u8::from(exchange.started);
+        if exchange.started {
+            // The device is present, so only its final reply may have been lost.
+            exchange.overruns += 1;
+            exchange.unanswered = 0;
+        }
         if self.is_exhausted(&exchange) {
             return self.give_up(now_us, &exchange);
         }
-        exchange.attempts += 1;
+        exchange.attempts = exchange.attempts.saturating_add(1);
+        exchange.unanswered += 1;
         exchange.started = false;
         exchange.frame = exchange.frame.with_leading_delimiter();
         self.stats.retries += 1;
@@ -129,7 +138,9 @@ impl Host {
         self.stats.retries += 1;
         self.send(now_us, exchange.request);
         if let Some(renewed) = &mut self.exchange {
-            renewed.attempts = exchange.attempts + 1;
+            renewed.attempts = exchange.attempts.saturating_add(1);
+            renewed.unanswered = exchange.unanswered + 1;
+            renewed.overruns = exchange.overruns;
         }
     }
 
@@ -139,7 +150,7 @@ impl Host {
         } else {
             self.config.max_attempts
         };
-        exchange.attempts >= attempts || exchange.overruns >= self.config.max_overruns
+        exchange.unanswered >= attempts || exchange.overruns >= self.config.max_overruns
     }
 
     /// Ends a failed exchange. A device that replied since the first transmission may still be
@@ -176,7 +187,7 @@ impl Host {
         } else if bytes > 0 && self.stats.frames_received == frames {
             HostError::NotADevice { bytes }
         } else {
-            HostError::NoAnswer { attempts: exchange.attempts }
+            HostError::NoAnswer { attempts: exchange.unanswered }
         }
     }
 

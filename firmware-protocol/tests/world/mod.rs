@@ -96,6 +96,8 @@ pub fn encode_echoes(number: usize, step: i32, window_ticks: u32, max_echoes: u8
 
 impl World {
     pub fn new(boot: u16, clock_offset: u32) -> Self {
+        // The device replaces 0 by 1, which `reboot` would repeat.
+        let boot = boot.max(1);
         Self {
             device: Device::new(board(boot)),
             clock: 0,

@@ -1,6 +1,8 @@
 //! Joint simulation of host, line, device and board; time jumps from event to event.
 
+use firmware_protocol::frame::{FrameDecoder, Received};
 use firmware_protocol::host::{Command, Host, HostConfig, HostEvent};
+use firmware_protocol::messages::Reply;
 
 use super::World;
 use super::line::{Faults, Line, Random};
@@ -10,6 +12,25 @@ const NS_PER_US: u64 = 1_000;
 /// Maximum number of bytes that a UART accepts at a time.
 const FIFO: usize = 8;
 
+/// Replies at one end of the line, with the numbers of their requests.
+#[derive(Debug, Default)]
+pub struct ReplyLog {
+    decoder: FrameDecoder,
+    pub replies: Vec<(u16, Reply)>,
+}
+
+impl ReplyLog {
+    fn record(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            if let Received::Frame(raw) = self.decoder.push(byte)
+                && let Ok(reply) = Reply::decode(raw.body)
+            {
+                self.replies.push((raw.header.seq, reply));
+            }
+        }
+    }
+}
+
 /// Both machines and everything in between.
 pub struct Sim {
     pub host: Host,
@@ -18,6 +39,10 @@ pub struct Sim {
     pub down: Line,
     pub now_ns: u64,
     pub events: Vec<(u64, HostEvent)>,
+    /// Replies as sent by the device.
+    pub sent: ReplyLog,
+    /// Replies as received by the host.
+    pub received: ReplyLog,
     /// Time at which the device restarts.
     pub reboot_at_ns: Option<u64>,
     /// Time at which the line is cut.
@@ -47,6 +72,8 @@ impl Sim {
             down: Line::new(u64::from(baud), faults, Random::new(random.next())),
             now_ns: 0,
             events: Vec::new(),
+            sent: ReplyLog::default(),
+            received: ReplyLog::default(),
             reboot_at_ns: None,
             hangup_at_ns: None,
             emergency_at_ns: None,
@@ -118,6 +145,7 @@ impl Sim {
         self.device_sends();
         let now_us = self.now_us();
         let to_host = self.down.arrived(self.now_ns);
+        self.received.record(&to_host);
         if !to_host.is_empty() {
             self.host.handle_bytes(now_us, &to_host);
         }
@@ -158,6 +186,7 @@ impl Sim {
             if count == 0 {
                 return;
             }
+            self.sent.record(&fifo[..count]);
             self.down.send(self.now_ns, &fifo[..count]);
             // A Reset may wait until the line has drained.
             self.world.settle();
