@@ -114,8 +114,10 @@ const fn host_help(error: &HostError) -> &'static str {
         HostError::Overrun { .. } => {
             "check that the motor turns, its supply and its index sensor; reset the board"
         }
-        HostError::Stalled { .. }
-        | HostError::SweepLost
+        HostError::Stalled { .. } => {
+            "the line loses most of what the device sends: check cable and baud rate, then scan again"
+        }
+        HostError::SweepLost
         | HostError::WrongReading { .. }
         | HostError::InvalidReading(_)
         | HostError::InvalidReply(_) => {
