@@ -64,7 +64,7 @@ fn surveyed_plan_takes_the_place_of_the_scene() {
     assert!(text.contains(" walls from 3 scans, ") && text.contains(" arcs explained"), "{text}");
     // Walls by status and poses are drawn and explained.
     assert!(drawn_pixels(&browser, "under") > before + 500);
-    for label in ["surveyed wall: observed", "surveyed pose", "95 % region of the pose"] {
+    for label in ["surveyed wall or post: observed", "surveyed pose", "95 % region of the pose"] {
         until_has(&browser, "#legend", label);
     }
     browser.picture("page-survey");
