@@ -70,7 +70,8 @@ check_tools() {
     if [ ${#needed[@]} != 0 ]; then tests/install.sh "" "${needed[@]}"; fi
   fi
   local free_gb
-  free_gb=$(df -Pk "$(mkdir -p "${CARGO_TARGET_DIR:-target}" && cd "${CARGO_TARGET_DIR:-target}" && pwd)" | awk 'END {printf "%d", $4 / 1048576}')
+  mkdir -p "${CARGO_TARGET_DIR:-target}"
+  free_gb=$(df -Pk "${CARGO_TARGET_DIR:-target}" | awk 'END {printf "%d", $4 / 1048576}')
   printf '%s GB of disk are free; a first run takes 8 GB\n' "$free_gb"
   if [ "$free_gb" -lt 2 ]; then
     fail "the disk is nearly full: remove target folders (cargo clean), or set CARGO_TARGET_DIR to a folder on another disk"

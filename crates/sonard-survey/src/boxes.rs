@@ -1,6 +1,5 @@
 //! Boxes of unknown size behind a face or an unexplained echo.
 
-use rayon::prelude::*;
 use sonard_model::geometry::{DVec2, distance_to_segment, encloses};
 
 use crate::{
@@ -9,6 +8,7 @@ use crate::{
     judge::Judge,
     line::Line,
     posed::PosedPlan,
+    ranking::{climbed, ranked},
 };
 
 /// Limits of the sides of a box, metres.
@@ -90,7 +90,7 @@ fn grown(face: &BoxShape, walls: &[Segment], judge: &Judge) -> Option<(f64, BoxS
         BoxShape { depth_m: depth_m.copysign(f64::from(at)), ..face.clone() }
     };
     let depths = (-count..=count).filter(|at| *at != 0).map(depth);
-    let mut starts = scored(depths.collect(), walls, &rough);
+    let mut starts = ranked(depths.collect(), |shape| score_of(shape, walls, &rough));
     starts.truncate(STARTS);
     let searched = starts.into_iter().map(|(score, shape)| {
         let ends = ends_of(shape, walls, &rough, score);
@@ -115,7 +115,9 @@ fn ends_of(from: BoxShape, walls: &[Segment], rough: &Judge, score: f64) -> BoxS
                 }
                 shape
             };
-            let tried = scored((-inwards..=outwards).map(with).collect(), walls, rough);
+            let tried = ranked((-inwards..=outwards).map(with).collect(), |shape| {
+                score_of(shape, walls, rough)
+            });
             if let Some((score, shape)) = tried.into_iter().next().filter(|of| of.0 > best_score) {
                 (best, best_score) = (shape, score);
             }
@@ -126,15 +128,14 @@ fn ends_of(from: BoxShape, walls: &[Segment], rough: &Judge, score: f64) -> BoxS
 
 /// Box with all three sizes improved by steps that become smaller.
 fn fine(from: BoxShape, walls: &[Segment], judge: &Judge) -> (f64, BoxShape) {
-    let mut best = from;
-    let mut score = f64::NEG_INFINITY;
+    const MAX_STEPS: usize = 6;
+    let mut best = (f64::NEG_INFINITY, from);
     for step_m in FINE_M {
         let own = judge.with_sigma(judge.sigma_m.max(0.5 * step_m));
-        score = score_of(&best, walls, &own).unwrap_or(f64::NEG_INFINITY);
-        for _ in 0..6 {
+        let neighbours = |shape: &BoxShape| {
             let moved = (0..6).map(|at| {
                 let by_m = if at % 2 == 0 { step_m } else { -step_m };
-                let mut shape = best.clone();
+                let mut shape = shape.clone();
                 match at / 2 {
                     0 => shape.from_m += by_m,
                     1 => shape.to_m += by_m,
@@ -142,24 +143,11 @@ fn fine(from: BoxShape, walls: &[Segment], judge: &Judge) -> (f64, BoxShape) {
                 }
                 shape
             });
-            let tried = scored(moved.collect(), walls, &own);
-            let Some((gained, shape)) = tried.into_iter().next().filter(|of| of.0 > score) else {
-                break;
-            };
-            (score, best) = (gained, shape);
-        }
+            moved.collect()
+        };
+        best = climbed(best.1, MAX_STEPS, neighbours, |shape| score_of(shape, walls, &own));
     }
-    (score, best)
-}
-
-/// Valid boxes with their scores, the best first.
-fn scored(shapes: Vec<BoxShape>, walls: &[Segment], judge: &Judge) -> Vec<(f64, BoxShape)> {
-    let mut found: Vec<(f64, BoxShape)> = shapes
-        .into_par_iter()
-        .filter_map(|shape| Some((score_of(&shape, walls, judge)?, shape)))
-        .collect();
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    found
+    best
 }
 
 fn score_of(shape: &BoxShape, walls: &[Segment], judge: &Judge) -> Option<f64> {

@@ -30,15 +30,12 @@ impl PlanCovariance {
         [sigma(at), sigma(at + 1), sigma(at + 2).to_degrees()]
     }
 
-    /// Standard deviations of a post: x and y of its centre and radius, metres.
-    pub(crate) fn post_sigma(&self, post: usize) -> [f64; 3] {
+    /// Standard deviations of a post: x and y of its centre and radius, metres; `None` for a post
+    /// added since the estimate.
+    pub(crate) fn post_sigma(&self, post: usize) -> Option<[f64; 3]> {
         let at = self.columns.of_post(post);
-        [at, at + 1, at + 2].map(|at| self.matrix[(at, at)].max(0.0).sqrt())
-    }
-
-    /// Returns `true` if the covariance has the columns of a post.
-    pub(crate) fn has_post(&self, post: usize) -> bool {
-        self.columns.of_post(post) + 3 <= self.columns.count()
+        let sigma = |at: usize| self.matrix[(at, at)].max(0.0).sqrt();
+        (at + 3 <= self.columns.count()).then(|| [at, at + 1, at + 2].map(sigma))
     }
 
     /// Standard deviations of a line's direction, degrees, and of its distance at a position along

@@ -208,8 +208,17 @@ impl<'a> Judge<'a> {
 
     /// Digest of walls, posts, poses, standard deviation of ranges and freedom of headings.
     fn digest(&self, segments: &[Segment]) -> u64 {
-        let of_plan = plan_digest(segments, &self.posts, &self.poses, self.sigma_m);
-        if self.are_headings_free { of_plan.rotate_left(1) ^ 1 } else { of_plan }
+        let mut hasher = DefaultHasher::new();
+        segments.len().hash(&mut hasher);
+        let ends = segments.iter().flat_map(|wall| [wall.a.to_array(), wall.b.to_array()]);
+        let poses = self.poses.iter().flat_map(|pose| [pose.x_m, pose.y_m, pose.heading_deg]);
+        let posts =
+            self.posts.iter().flat_map(|post| [post.center.x, post.center.y, post.radius_m]);
+        for value in ends.flatten().chain(poses).chain([self.sigma_m]).chain(posts) {
+            value.to_bits().hash(&mut hasher);
+        }
+        self.are_headings_free.hash(&mut hasher);
+        hasher.finish()
     }
 
     /// Log-likelihood of the readings of a sweep and of its odometry at the likeliest heading, nats,
@@ -279,19 +288,6 @@ impl<'a> Judge<'a> {
             self.readings().iter().zip(&self.poses).map(of_sweep).collect();
         all.map(|all| (simulator, all))
     }
-}
-
-/// Digest of walls, posts, poses and standard deviation of ranges in metres.
-fn plan_digest(segments: &[Segment], posts: &[PostShape], poses: &[Pose], sigma_m: f64) -> u64 {
-    let mut hasher = DefaultHasher::new();
-    segments.len().hash(&mut hasher);
-    let ends = segments.iter().flat_map(|wall| [wall.a.to_array(), wall.b.to_array()]);
-    let poses = poses.iter().flat_map(|pose| [pose.x_m, pose.y_m, pose.heading_deg]);
-    let posts = posts.iter().flat_map(|post| [post.center.x, post.center.y, post.radius_m]);
-    for value in ends.flatten().chain(poses).chain([sigma_m]).chain(posts) {
-        value.to_bits().hash(&mut hasher);
-    }
-    hasher.finish()
 }
 
 /// Scene with walls and posts of the first material of a template; both keep their index.

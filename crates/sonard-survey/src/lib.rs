@@ -36,6 +36,7 @@ mod post;
 mod posts;
 mod progress;
 mod range_errors;
+mod ranking;
 mod readings;
 mod refine;
 mod relocate;

@@ -8,7 +8,7 @@ use crate::{
     arc::{Arc, quantile},
     arrangement::Segment,
     judge::Judge,
-    normal::{NormalEquations, move_pose, pose_column},
+    normal::{NormalEquations, pose_column},
     posed::{LineColumns, PosedPlan},
     trace::explain,
 };
@@ -28,8 +28,8 @@ struct Linearized {
     normal: NormalEquations,
 }
 
-/// Improves poses, lines and posts by the likelihood of all readings: ranges, missing echoes and the ends
-/// of arcs. Directions are tied to a square axis if the survey assumes one. Returns `None` if the
+/// Improves poses, lines and posts by the likelihood of all readings: ranges, missing echoes and
+/// the ends of arcs. Directions are tied to a square axis if the survey assumes one. Returns `None` if the
 /// normal equations have no solution.
 pub(crate) fn polish(posed: &mut PosedPlan, judge: &Judge) -> Option<()> {
     let rough = error_model(posed, judge)?;
@@ -44,7 +44,7 @@ fn climb(posed: &mut PosedPlan, judge: &Judge, errors: &ErrorModel) -> Option<()
     let mut damping = 1e-3;
     for _ in 0..MAX_STEPS {
         let step = best.normal.step(damping)?;
-        let tried = moved(posed, &step, judge);
+        let tried = posed.moved(&LineColumns::new(posed), &step, judge.workspace.reach_m());
         let Some(at) = linearize(&tried, judge, errors) else { break };
         let gain = at.value - best.value;
         if gain <= 0.0 {
@@ -101,7 +101,7 @@ fn linearize(posed: &PosedPlan, judge: &Judge, errors: &ErrorModel) -> Option<Li
     let workspace = judge.workspace;
     let segments = posed.plan.segments(&posed.walls);
     let mut world = workspace.world.clone();
-    world.scene = std::sync::Arc::new(judge.at(posed).scene_of(&segments));
+    world.scene = std::sync::Arc::new(judge.with_posts(&posed.posts).scene_of(&segments));
     let mut parameters = vec![Parameter::X(0), Parameter::Y(0), Parameter::Heading(0)];
     parameters.extend((0..segments.len()).map(Parameter::Wall));
     parameters.extend((0..segments.len()).map(Parameter::WallTurn));
@@ -177,31 +177,4 @@ fn add_mapped(
             }
         }
     }
-}
-
-/// Plan and poses after a step.
-fn moved(posed: &PosedPlan, step: &DVector<f64>, judge: &Judge) -> PosedPlan {
-    let columns = LineColumns::new(posed);
-    let mut poses = posed.poses.clone();
-    for (at, pose) in poses.iter_mut().enumerate() {
-        if let Some(column) = pose_column(at) {
-            move_pose(pose, [0, 1, 2].map(|offset| step[column + offset]));
-        }
-    }
-    let mut lines = posed.plan.lines.clone();
-    for (at, line) in lines.iter_mut().enumerate() {
-        if let Some(column) = columns.of(at) {
-            line.normal_rad += step[column];
-            line.distance_m += step[column + 1];
-        }
-        line.update_feet(&poses);
-    }
-    let reach_m = judge.workspace.reach_m();
-    let (plan, walls) = posed.plan.rebuilt(&posed.walls, lines, &poses, reach_m);
-    let mut posts = posed.posts.clone();
-    for (number, post) in posts.iter_mut().enumerate() {
-        let at = columns.of_post(number);
-        *post = post.moved([0, 1, 2].map(|offset| step[at + offset]));
-    }
-    PosedPlan { plan, walls, posts, poses }
 }

@@ -1,11 +1,12 @@
 //! Plan with its poses, and the columns of both in normal equations.
 
+use nalgebra::DVector;
 use sonard_model::geometry::Pose;
 
 use crate::{
     arrangement::{LineArrangement, PieceSet, Run},
     line::{off_square_rad, square_axis},
-    normal::NormalEquations,
+    normal::{NormalEquations, move_pose, pose_column},
     post::PostShape,
     square::MAX_OFF_RAD,
 };
@@ -24,6 +25,29 @@ impl PosedPlan {
     pub(crate) fn without_walls(poses: Vec<Pose>) -> Self {
         let plan = LineArrangement::new(Vec::new(), &poses, 0.0);
         Self { plan, walls: PieceSet::default(), posts: Vec::new(), poses }
+    }
+
+    /// Plan after a step of its numbers, by column, with lines as long as the range `reach_m`.
+    pub(crate) fn moved(&self, columns: &LineColumns, step: &DVector<f64>, reach_m: f64) -> Self {
+        let three = |column: usize| [0, 1, 2].map(|offset| step[column + offset]);
+        let mut poses = self.poses.clone();
+        for (at, pose) in poses.iter_mut().enumerate() {
+            if let Some(column) = pose_column(at) {
+                move_pose(pose, three(column));
+            }
+        }
+        let mut lines = self.plan.lines.clone();
+        for (line, column) in lines.iter_mut().zip(columns.lines()) {
+            if let Some(column) = column {
+                line.normal_rad += step[column];
+                line.distance_m += step[column + 1];
+            }
+            line.update_feet(&poses);
+        }
+        let (plan, walls) = self.plan.rebuilt(&self.walls, lines, &poses, reach_m);
+        let posts = self.posts.iter().enumerate();
+        let posts = posts.map(|(at, post)| post.moved(three(columns.of_post(at)))).collect();
+        Self { plan, walls, posts, poses }
     }
 
     /// Plan without walls shorter than `max_m` metres.

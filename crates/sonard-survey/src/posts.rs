@@ -1,6 +1,5 @@
 //! Posts: upright cylinders such as table legs, found from arcs that the walls leave unexplained.
 
-use rayon::prelude::*;
 use sonard_model::geometry::{Pose, wrap_pi};
 
 use crate::{
@@ -10,6 +9,7 @@ use crate::{
     normal::NormalEquations,
     posed::PosedPlan,
     post::{CLEAR_M, PostShape},
+    ranking::{climbed, ranked},
 };
 
 /// Posts that a round adds.
@@ -63,8 +63,7 @@ pub(crate) fn with_new_posts<'a>(
     kind: PostKind,
     left_by: impl Fn(&PosedPlan) -> Vec<&'a Arc>,
 ) -> Option<PosedPlan> {
-    let score =
-        |of: &PosedPlan| judge.with_posts(&of.posts).score_segments(&of.plan.segments(&of.walls));
+    let score = |of: &PosedPlan| score_with_posts(of, judge);
     let before = score(posed);
     let mut grown = posed.without_short_walls(SHORT_M);
     while grown.posts.len() < MAX_POSTS {
@@ -99,22 +98,19 @@ pub(crate) fn with_new_posts<'a>(
 fn best_post(posed: &PosedPlan, judge: &Judge, posts: Vec<PostShape>) -> Option<PostShape> {
     let before = judge.score_segments(&posed.plan.segments(&posed.walls));
     let rough = judge.with_sigma(judge.workspace.errors.sigma_m(ROUGH_SIGMA_M));
-    let mut scored = scored(posts, posed, &rough);
-    scored.truncate(MAX_REFINED);
-    let found = scored.into_iter().map(|(_, post)| fine(post, posed, judge));
+    let best = ranked(posts, |post| score_of(post, posed, &rough)).into_iter().take(MAX_REFINED);
+    let found = best.map(|(_, post)| fine(post, posed, judge));
     let (score, post) = found.max_by(|a, b| a.0.total_cmp(&b.0))?;
     (score > before + MIN_GAIN).then_some(post)
 }
 
 /// Plan without the posts that do not gain their price; `None` if all of them do.
 pub(crate) fn without_idle_posts(posed: &PosedPlan, judge: &Judge) -> Option<PosedPlan> {
-    let walls = posed.plan.segments(&posed.walls);
     let mut kept = posed.clone();
-    let mut score = judge.with_posts(&kept.posts).score_segments(&walls);
+    let mut score = score_with_posts(&kept, judge);
     for at in (0..posed.posts.len()).rev() {
-        let mut fewer = kept.clone();
-        fewer.posts.remove(at);
-        let without = judge.with_posts(&fewer.posts).score_segments(&walls);
+        let fewer = without_post(&kept, at);
+        let without = score_with_posts(&fewer, judge);
         if without > score - MIN_GAIN {
             (kept, score) = (fewer, without);
         }
@@ -124,14 +120,20 @@ pub(crate) fn without_idle_posts(posed: &PosedPlan, judge: &Judge) -> Option<Pos
 
 /// Loss of score without each post, others unchanged, nats.
 pub(crate) fn evidence_nats(posed: &PosedPlan, judge: &Judge) -> Vec<f64> {
-    let walls = posed.plan.segments(&posed.walls);
-    let score = judge.score_segments(&walls);
-    let of = |at: usize| {
-        let mut fewer = posed.posts.clone();
-        fewer.remove(at);
-        score - judge.with_posts(&fewer).score_segments(&walls)
-    };
+    let score = score_with_posts(posed, judge);
+    let of = |at| score - score_with_posts(&without_post(posed, at), judge);
     (0..posed.posts.len()).map(of).collect()
+}
+
+/// Score of a plan with its own posts, from the poses of a judge.
+fn score_with_posts(posed: &PosedPlan, judge: &Judge) -> f64 {
+    judge.with_posts(&posed.posts).score_segments(&posed.plan.segments(&posed.walls))
+}
+
+fn without_post(posed: &PosedPlan, at: usize) -> PosedPlan {
+    let mut fewer = posed.clone();
+    fewer.posts.remove(at);
+    fewer
 }
 
 /// Posts on which unexplained arcs of several sweeps agree, those of most beams first.
@@ -210,33 +212,20 @@ fn fine(from: PostShape, posed: &PosedPlan, judge: &Judge) -> (f64, PostShape) {
     let mut best = from;
     for step_m in FINE_M {
         let own = judge.with_sigma(judge.sigma_m.max(0.5 * step_m));
-        let mut score = score_of(&best, posed, &own).unwrap_or(f64::NEG_INFINITY);
-        for _ in 0..MAX_STEPS {
+        let neighbours = |post: &PostShape| {
             let moved = (0..6).map(|at| {
                 let mut by = [0.0; 3];
                 by[at / 2] = if at % 2 == 0 { step_m } else { -step_m };
-                best.moved(by)
+                post.moved(by)
             });
-            let tried = scored(moved.collect(), posed, &own);
-            let Some((gained, post)) = tried.into_iter().next().filter(|of| of.0 > score) else {
-                break;
-            };
-            (score, best) = (gained, post);
-        }
+            moved.collect()
+        };
+        (_, best) = climbed(best, MAX_STEPS, neighbours, |post| score_of(post, posed, &own));
     }
     (score_of(&best, posed, judge).unwrap_or(f64::NEG_INFINITY), best)
 }
 
-/// Valid posts with the scores of the plan with each, the best first.
-fn scored(posts: Vec<PostShape>, posed: &PosedPlan, judge: &Judge) -> Vec<(f64, PostShape)> {
-    let mut found: Vec<(f64, PostShape)> = posts
-        .into_par_iter()
-        .filter_map(|post| Some((score_of(&post, posed, judge)?, post)))
-        .collect();
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
-    found
-}
-
+/// Score of a plan with one more post; `None` where none can be.
 fn score_of(post: &PostShape, posed: &PosedPlan, judge: &Judge) -> Option<f64> {
     let walls = posed.plan.segments(&posed.walls);
     let with = || [&posed.posts[..], &[*post]].concat();

@@ -5,7 +5,7 @@ use sonard_model::geometry::wrap_180;
 use crate::{
     covariance::PlanCovariance,
     judge::Judge,
-    normal::{NormalEquations, move_pose, pose_column},
+    normal::{NormalEquations, pose_column},
     posed::{LineColumns, PosedPlan},
     rows::RowBuilder,
     trace::{explain, predicted_arcs},
@@ -19,7 +19,8 @@ const PRIOR: [f64; 3] = [0.1, 0.052, 0.087];
 /// Maximum change of a step in the same order.
 const MAX_STEP: [f64; 3] = [0.02, 0.017, 0.026];
 
-/// Improves poses, lines and posts together as far as the likelihood gains, and returns the covariance.
+/// Improves poses, lines and posts together as far as the likelihood gains, and returns the
+/// covariance.
 /// Ranges that differ by more than `gate_m` do not belong together.
 pub(crate) fn refine(
     posed: &mut PosedPlan,
@@ -113,24 +114,7 @@ fn step(posed: &mut PosedPlan, judge: &Judge, gate_m: f64) -> Option<()> {
         excess = excess.max(by.abs() / max);
     }
     let step = step / excess;
-    for (at, pose) in posed.poses.iter_mut().enumerate().skip(1) {
-        let at = pose_column(at)?;
-        move_pose(pose, [step[at], step[at + 1], step[at + 2]]);
-    }
-    for (number, post) in posed.posts.iter_mut().enumerate() {
-        let at = columns.of_post(number);
-        *post = post.moved([step[at], step[at + 1], step[at + 2]]);
-    }
-    let mut lines = posed.plan.lines.clone();
-    for (line, at) in lines.iter_mut().zip(columns.lines()) {
-        if let Some(at) = at {
-            line.normal_rad += step[at];
-            line.distance_m += step[at + 1];
-        }
-        line.update_feet(&posed.poses);
-    }
-    (posed.plan, posed.walls) =
-        posed.plan.rebuilt(&posed.walls, lines, &posed.poses, judge.workspace.reach_m());
+    *posed = posed.moved(&columns, &step, judge.workspace.reach_m());
     Some(())
 }
 

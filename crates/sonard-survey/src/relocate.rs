@@ -19,10 +19,9 @@ const MAX_LOST: f64 = 0.5;
 /// a better one.
 pub(crate) fn relocated(posed: &PosedPlan, judge: &Judge) -> Option<Vec<Pose>> {
     let workspace = judge.workspace;
-    let explained_m = workspace.errors.explained_m();
     let segments = posed.plan.segments(&posed.walls);
     let (simulator, predictions) = judge.predictions(&segments)?;
-    let left = unexplained(&workspace.arcs, &workspace.readings, &predictions, explained_m);
+    let left = unexplained(workspace, &predictions);
     let lost_share = workspace.max_unexplained_share();
     let is_lost = |sweep: &usize| {
         let of_sweep = left.iter().filter(|arc| arc.sweep == *sweep).count();

@@ -45,7 +45,7 @@ pub(crate) fn report(
     let predictions = predictions.map(|(_, predictions)| predictions).unwrap_or_default();
     let left = match predictions.is_empty() {
         true => workspace.arcs.iter().flatten().collect(),
-        false => unexplained(&workspace.arcs, &workspace.readings, &predictions, explained_m),
+        false => unexplained(workspace, &predictions),
     };
     let causes = workspace.readings.iter().zip(&predictions).map(|(readings, predictions)| {
         readings
@@ -157,7 +157,7 @@ fn surveyed_posts(
         own.map(|of| of.arc.sweep).collect::<BTreeSet<usize>>().len()
     };
     let surveyed = |(at, evidence_nats): (usize, f64)| {
-        let sigma = covariance.filter(|of| of.has_post(at)).map(|of| of.post_sigma(at));
+        let sigma = covariance.and_then(|of| of.post_sigma(at));
         let sweeps = sweeps_of(at);
         let is_determined = sigma.is_some_and(|of| of.iter().all(|m| *m < MAX_POST_SIGMA_M));
         let is_observed = sweeps >= MIN_POST_SWEEPS && is_determined && evidence_nats > LISTED_NATS;

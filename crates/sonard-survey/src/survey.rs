@@ -5,6 +5,7 @@ use sonard_model::geometry::{DVec2, Pose};
 
 use crate::{
     alternatives::{Assessment, assess},
+    arc::Arc,
     arrangement::{LineArrangement, Segment},
     boxes::with_box,
     bundle::{SupportedFeature, fit_feature},
@@ -34,7 +35,7 @@ use crate::{
         virtual_map_in_order,
     },
     square::square_lines,
-    trace::unexplained,
+    trace::unexplained_by,
     workspace::Workspace,
 };
 
@@ -388,8 +389,11 @@ impl<'a> SurveySearch<'a> {
             if self.workspace.is_over() || self.posed.posts.is_empty() && self.left().is_empty() {
                 break;
             }
-            let changed = without_idle_posts(&self.posed, &judge)
-                .or_else(|| with_new_posts(&self.posed, &judge, kind, |posed| self.left_by(posed)));
+            let changed = without_idle_posts(&self.posed, &judge).or_else(|| {
+                with_new_posts(&self.posed, &judge, kind, |posed| {
+                    unexplained_by(posed, self.workspace)
+                })
+            });
             let Some(changed) = changed else { break };
             self.posed = changed;
             self.refine(&judge, gate_m);
@@ -472,24 +476,8 @@ impl<'a> SurveySearch<'a> {
     }
 
     /// Arcs that the walls leave unexplained.
-    fn left(&self) -> Vec<&'a crate::arc::Arc> {
-        self.left_by(&self.posed)
-    }
-
-    /// Arcs that a plan leaves unexplained.
-    fn left_by(&self, posed: &PosedPlan) -> Vec<&'a crate::arc::Arc> {
-        let judge = Judge::of(self.workspace, posed, 1.0);
-        let segments = posed.plan.segments(&posed.walls);
-        let workspace = self.workspace;
-        match judge.predictions(&segments) {
-            Some((_, predictions)) => unexplained(
-                &workspace.arcs,
-                &workspace.readings,
-                &predictions,
-                self.errors().explained_m(),
-            ),
-            None => workspace.arcs.iter().flatten().collect(),
-        }
+    fn left(&self) -> Vec<&'a Arc> {
+        unexplained_by(&self.posed, self.workspace)
     }
 
     fn early_end(&self) -> Option<SearchEnd> {

@@ -6,8 +6,10 @@ use crate::{
     arc::{Arc, find_arcs},
     arrangement::{LineArrangement, PieceSet, Run},
     judge::{Judge, Predictions, outcome_of},
+    posed::PosedPlan,
     range_errors::RangeErrors,
     readings::{Outcome, Readings},
+    workspace::Workspace,
 };
 
 /// Arc that a plan explains.
@@ -61,16 +63,24 @@ pub(crate) fn explain<'a>(
 }
 
 /// Arcs that predictions leave unexplained.
-pub(crate) fn unexplained<'a>(
-    arcs: &'a [Vec<Arc>],
-    readings: &[Readings],
-    predictions: &Predictions,
-    gate_m: f64,
-) -> Vec<&'a Arc> {
+pub(crate) fn unexplained<'a>(workspace: &'a Workspace, predictions: &Predictions) -> Vec<&'a Arc> {
+    const SHARE: f64 = 0.5;
+    let gate_m = workspace.errors.explained_m();
     let is_left = |arc: &&Arc| {
-        explain(arc, &readings[arc.sweep], &predictions[arc.sweep], gate_m, 0.5).is_none()
+        let (readings, predictions) = (&workspace.readings[arc.sweep], &predictions[arc.sweep]);
+        explain(arc, readings, predictions, gate_m, SHARE).is_none()
     };
-    arcs.iter().flatten().filter(is_left).collect()
+    workspace.arcs.iter().flatten().filter(is_left).collect()
+}
+
+/// Arcs that a plan leaves unexplained: all of them if its scene is invalid.
+pub(crate) fn unexplained_by<'a>(posed: &PosedPlan, workspace: &'a Workspace<'a>) -> Vec<&'a Arc> {
+    // Predictions are independent of the standard deviation.
+    let judge = Judge::of(workspace, posed, 1.0);
+    match judge.predictions(&posed.plan.segments(&posed.walls)) {
+        Some((_, predictions)) => unexplained(workspace, &predictions),
+        None => workspace.arcs.iter().flatten().collect(),
+    }
 }
 
 /// Pieces of walls that a path of an explained arc meets.

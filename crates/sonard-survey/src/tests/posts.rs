@@ -5,14 +5,13 @@ use sonard_model::scene::Cylinder;
 use super::*;
 use crate::{
     PieceStatus,
-    arc::Arc as EchoArc,
     judge::Judge,
     posed::PosedPlan,
     post::PostShape,
     posts::{PostKind, with_new_posts, without_idle_posts},
     progress::NoObserver,
     survey::{score_plan, survey},
-    trace::unexplained,
+    trace::unexplained_by,
 };
 
 /// Post clear of the stops.
@@ -38,22 +37,13 @@ fn posed(walls: &[[DVec2; 2]]) -> PosedPlan {
     PosedPlan { plan, walls, posts: Vec::new(), poses }
 }
 
-/// Arcs that a plan leaves unexplained.
-fn left_by<'a>(workspace: &'a Workspace<'a>, posed: &PosedPlan) -> Vec<&'a EchoArc> {
-    let judge = Judge::of(workspace, posed, 1.0);
-    let predictions = judge.predictions(&posed.plan.segments(&posed.walls));
-    let (_, predictions) = predictions.expect("a valid scene");
-    let explained_m = workspace.errors.explained_m();
-    unexplained(&workspace.arcs, &workspace.readings, &predictions, explained_m)
-}
-
 /// Plan with posts added at arcs that others leave unexplained.
 fn grown(world: &World, from: &PosedPlan) -> Option<PosedPlan> {
     let (poses, scores) = (stops(), PlanScores::default());
     let sweeps = sweeps(world, &poses, &poses);
     let workspace = true_workspace(world, &sweeps, (&NoObserver, &scores));
     let judge = Judge::of(&workspace, from, 0.004);
-    with_new_posts(from, &judge, PostKind::Round, |posed| left_by(&workspace, posed))
+    with_new_posts(from, &judge, PostKind::Round, |posed| unexplained_by(posed, &workspace))
 }
 
 #[test]
