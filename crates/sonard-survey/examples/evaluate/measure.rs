@@ -9,6 +9,7 @@ use sonard_model::{
     reading::PingStatus,
     scene::Scene,
 };
+use sonard_survey::PostShape;
 
 /// Wall as a pair of ends, metres.
 pub(crate) type Ends = [DVec2; 2];
@@ -160,4 +161,9 @@ pub(crate) fn explained(
 pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// Returns `true` if a place is within 2 cm of the axis of a post.
+pub(crate) fn is_post_at(at: DVec2, post: &PostShape) -> bool {
+    at.distance(post.center) < 0.02
 }
