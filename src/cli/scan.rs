@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use firmware_protocol::host::{HostError, LinkStats};
 use tokio::sync::{mpsc, oneshot};
 use tokio_serial::SerialStream;
+use uuid::Uuid;
 
 use super::{
     Failure, Outcome,
@@ -262,6 +263,14 @@ pub(super) async fn identify(
             Err(Failure::Found(Some("interrupted before the device replied".into())))
         }
     }
+}
+
+/// Path of a link to a mock's port, behind which it reopens after a hangup.
+///
+/// The name is unique for all time: a link that a killed program of another user left in the shared
+/// folder could not be replaced.
+pub(super) fn mock_link() -> PathBuf {
+    std::env::temp_dir().join(format!("sonard-mock-{}", Uuid::new_v4()))
 }
 
 /// Mock ranger running alongside a scan.

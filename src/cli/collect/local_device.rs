@@ -13,7 +13,7 @@ use crate::{
     cli::{
         mock_world::MockWorldArgs,
         runtime::Interrupts,
-        scan::{self, Mock, emulator::Emulator, setup::assumed},
+        scan::{self, Mock, emulator::Emulator, mock_link, setup::assumed},
     },
     collect::{
         CollectError, CollectionPlan, ConnectedDevice, RecordedScan, RetrySchedule, SavedSettings,
@@ -149,8 +149,7 @@ impl ScanDevice for LocalDevice {
         first: &PreparedScan,
     ) -> Result<(), CollectError> {
         if let Source::Mock(mock) = &mut self.source {
-            let link = std::env::temp_dir().join(format!("sonard-mock-{}", std::process::id()));
-            *mock = Some(Mock::start(self.world.board(&assumed(first))?, Some(&link))?);
+            *mock = Some(Mock::start(self.world.board(&assumed(first))?, Some(&mock_link()))?);
         }
         self.start_emulator(first)
     }

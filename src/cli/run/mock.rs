@@ -17,6 +17,7 @@ use crate::{
     cli::{
         Failure,
         mock_world::{AssumedModel, MockWorldArgs},
+        scan::mock_link,
     },
     daemon::{Relocate, Settings},
     geometry::Pose,
@@ -112,7 +113,7 @@ impl Mock {
         let pace = if virtual_time { Pace::Virtual } else { Pace::RealTime };
         let board = board(&world, pace, settings)?;
         let (relocate, moves) = follow(world, settings)?;
-        let link = std::env::temp_dir().join(format!("sonard-mock-{}", std::process::id()));
+        let link = mock_link();
         let port = MockPort::open(board, Some(&link)).map_err(|error| {
             Failure::device(format!("cannot make a pty: {error}"), "check that /dev/pts is mounted")
         })?;
