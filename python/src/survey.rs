@@ -26,6 +26,7 @@ use crate::{
     error::{LogError, SonardError, new_error},
     json,
     log::{Log, Scan, scans_of},
+    options::parse_name,
     pool::pool,
     readings::BeamReadings,
     scene::Scene,
@@ -62,6 +63,10 @@ const INTERRUPT_INTERVAL: Duration = Duration::from_millis(50);
 ///     Maximum range, metres, 0.3 to 20; longer ranges count as no echo.
 /// reflectance : float
 ///     Amplitude reflection coefficient of all walls, above 0, up to 1.
+/// fit : sequence of str
+///     Numbers of sensor and air to fit together with the plan: ``"threshold"``, ``"rise"`` (of the
+///     threshold with range), ``"mounting"``, ``"materials"`` (the reflectance), ``"air"`` (speed
+///     of sound), ``"delay"``, ``"gear"``, ``"beam"``, ``"skirts"``, ``"pulse"``.
 /// max_scenes : int
 ///     Budget of the search: maximum number of floor plans whose readings are predicted.
 /// closed : bool
@@ -78,15 +83,16 @@ const INTERRUPT_INTERVAL: Duration = Duration::from_millis(50);
 /// Raises
 /// ------
 /// SonardError
-///     With fewer than two sweeps, a sweep without arcs, or no wall found.
+///     With fewer than two sweeps, a sweep without arcs, a number that cannot be fitted, or no wall
+///     found.
 /// LogError
 ///     If no scan can be used, or the scans differ in sensor.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "they are keywords where they are used")]
 #[pyo3(signature = (sweeps, poses = None, *, azimuths_deg = None, sensor = None, air = None,
-    odometry = Some((0.05, 5.0)), square = false, max_range_m = 5.0, reflectance = 0.97, max_scenes = 30_000,
+    odometry = Some((0.05, 5.0)), square = false, max_range_m = 5.0, reflectance = 0.97, fit = Vec::new(), max_scenes = 30_000,
     closed = false, progress = None),
-    text_signature = "(sweeps, poses=None, *, azimuths_deg=None, sensor=None, air=None, odometry=(0.05, 5.0), square=False, max_range_m=5.0, reflectance=0.97, max_scenes=30000, closed=False, progress=None)")]
+    text_signature = "(sweeps, poses=None, *, azimuths_deg=None, sensor=None, air=None, odometry=(0.05, 5.0), square=False, max_range_m=5.0, reflectance=0.97, fit=(), max_scenes=30000, closed=False, progress=None)")]
 pub(crate) fn survey<'py>(
     py: Python<'py>,
     sweeps: &Bound<'py, PyAny>,
@@ -98,6 +104,7 @@ pub(crate) fn survey<'py>(
     square: bool,
     max_range_m: f64,
     reflectance: f64,
+    fit: Vec<String>,
     max_scenes: i64,
     closed: bool,
     progress: Option<Py<PyAny>>,
@@ -106,6 +113,7 @@ pub(crate) fn survey<'py>(
         let message = format!("max_scenes is {max_scenes}: it must be at least 1");
         return Err(PyValueError::new_err(message));
     };
+    let fit = fit.iter().map(|name| parse_name(py, "fit", name)).collect::<PyResult<_>>()?;
     let options = SurveyOptions {
         odometry: odometry.map(|(m_per_m, deg_per_m)| OdometrySigma {
             m_per_m,
@@ -114,6 +122,7 @@ pub(crate) fn survey<'py>(
         }),
         square_deg: square.then_some(SurveyOptions::SQUARE_DEG),
         reflectance,
+        fit,
         max_scenes,
         ..SurveyOptions::default()
     };
@@ -132,8 +141,10 @@ pub(crate) fn survey<'py>(
         new_error::<SonardError>(py, &message, "pass sweeps with more echoes")
     })?;
     let scene = Py::new(py, Scene::from_json(py, &scene.text())?)?;
+    let sensor = found.fitted.as_ref().map(|fitted| fitted.sensor.clone());
+    let sensor = sensor.map(|sensor| Py::new(py, sensor::Sensor { sensor })).transpose()?;
     let class = py.import("sonard._results")?.getattr("Survey")?;
-    class.call_method1("_from_dict", (json::to_python(py, &found)?, scene))
+    class.call_method1("_from_dict", (json::to_python(py, &found)?, scene, sensor))
 }
 
 /// Arguments that describe the sweeps.
@@ -295,6 +306,9 @@ fn survey_error(py: Python<'_>, sweeps: &[FitSweep], error: &SurveyError) -> PyE
         }
         SurveyError::World(_) | SurveyError::Scene(_) => {
             (error.to_string(), "check sensor, air and max_range_m")
+        }
+        SurveyError::Group(_) | SurveyError::NotFittable { .. } => {
+            (error.to_string(), "poses, walls and posts are estimated in any case")
         }
     };
     new_error::<SonardError>(py, &message, help)

@@ -21,7 +21,7 @@ use super::{
     what_if::{AssumptionFilter, InsteadArgs, WhatIf},
 };
 use crate::{
-    inverse::{FitSweep, World},
+    inverse::{FitSweep, ParameterGroup, World},
     scan::{Provenance, Session, text::format_count},
     survey::{
         OdometrySigma, PlanScores, SearchEnd, Survey, SurveyError, SurveyObserver, SurveyOptions,
@@ -65,6 +65,10 @@ pub(super) struct Args {
     /// Reflectance (amplitude) of all surfaces, 0 to 1
     #[arg(long, value_name = "R", default_value_t = 0.97, value_parser = within(0.05..=1.0))]
     reflectance: f64,
+    /// Numbers of sensor and air to fit together with the plan, separated by commas: threshold,
+    /// rise, mounting, materials (the reflectance), air, delay, gear, beam, skirts, pulse
+    #[arg(long, value_name = "WHAT", value_delimiter = ',', hide_possible_values = true)]
+    fit: Vec<ParameterGroup>,
     /// Budget of the search: maximum number of floor plans whose readings are predicted
     #[arg(long, value_name = "N", default_value_t = SurveyOptions::default().max_scenes,
           value_parser = parse_count)]
@@ -92,11 +96,17 @@ plans that explain the readings nearly as well are listed with their probabiliti
 the pose of the first sweep in the log. Dimensions follow the speed of sound: 0.17 % per degree.
 
 An interrupted survey, or one whose budget is spent, writes the best plan so far. The same command \
-continues from unfinished.jsonl, also after the program was killed; --max-scenes may differ.";
+continues from unfinished.jsonl, also after the program was killed; --max-scenes may differ.
+
+--fit estimates numbers of the ranger and of the air together with plan and poses, from the values \
+assumed and with the priors of `sonard calibrate`, and searches the plan again with them. Some \
+remain at their priors: the speed of sound is coupled to all dimensions, and only odometry separates \
+both.";
 
 const HELP: &str = "\
 Files in DIR: scene.json with the stops as poses; poses.csv; survey.json with covariances, status, \
-alternatives and the cause of each reading; report.md; plan.svg and plan.png.
+alternatives and the cause of each reading; report.md; plan.svg and plan.png; with --fit also \
+sensor.json and air.json.
 
 Examples:
   sonard simulate --scene two-surface-room --pose 0.6,0.6,0 -o a.jsonl
@@ -104,6 +114,8 @@ Examples:
   sonard simulate --scene two-surface-room --pose 0.8,1.1,90 -o c.jsonl
   sonard survey a.jsonl b.jsonl c.jsonl --odometry 0.05,5 --out room
   sonard locate a.jsonl --scene room/scene.json
+  sonard survey a.jsonl b.jsonl c.jsonl --fit threshold,mounting --out fitted
+  sonard compare a.jsonl --scene fitted/scene.json --sensor fitted/sensor.json
 
 Exit codes: 0 done, 1 ended early (interrupted, or the budget is spent), 2 wrong usage or input, \
 3 write error.";
@@ -122,7 +134,7 @@ pub(super) fn run(args: &Args) -> Outcome {
     let saved = checkpoint::load(&args.out, args.overwrite, &head)?;
     // The results beside a checkpoint are those of the same survey.
     let overwrite = args.overwrite.or_forced(saved.is_some());
-    files::check(&args.out, overwrite)?;
+    files::check(args, overwrite)?;
     let scores = saved.unwrap_or_default();
     let search = || find(args, &input, &scores);
     let found = checkpoint::while_saving(&args.out, overwrite, &head, &scores, search)?;
@@ -148,6 +160,7 @@ impl Args {
             range_sigma_m: self.range_sigma,
             square_deg: self.square.then_some(SurveyOptions::SQUARE_DEG),
             reflectance: self.reflectance,
+            fit: self.fit.clone(),
             max_scenes: self.max_scenes,
             ..SurveyOptions::default()
         }
@@ -250,6 +263,8 @@ fn failure_from(error: &SurveyError) -> Failure {
         SurveyError::World(_) | SurveyError::Scene(_) | SurveyError::Option { .. } => {
             "check sensor and air of the logs, and the options"
         }
+        SurveyError::Group(error) => return Failure::input(error, error.help()),
+        SurveyError::NotFittable { .. } => "poses, walls and posts are estimated in any case",
     };
     Failure::input(error, help)
 }

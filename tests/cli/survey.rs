@@ -284,3 +284,41 @@ fn collected_scans_of_unknown_room_give_scene_for_all_verbs() {
     succeeds(&["map", &predicted, "--out", &at("map")]);
     assert!(fs::read(at("map/map.pgm")).expect("a map").starts_with(b"P5"));
 }
+
+#[test]
+fn survey_fits_the_ranger() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let logs = sweeps(folder.path(), &Value::Null);
+    let preset: Value =
+        serde_json::from_str(&succeeds(&["sensor", "show", "senscomp-6500"])).expect("JSON");
+    // Simulated with the preset; the survey assumes one that is 3 dB less sensitive.
+    let mut assumed = preset.clone();
+    let threshold = preset["threshold"].as_f64().expect("a number");
+    assumed["threshold"] = (threshold * 10f64.powf(3.0 / 20.0)).into();
+    let sensor = path(folder.path(), "assumed.json");
+    fs::write(&sensor, assumed.to_string()).expect("written");
+    let out = path(folder.path(), "out");
+    let arguments = ["survey", "--sensor", &sensor, "--fit", "threshold", "--max-range", "4"];
+    let mut arguments = [&arguments[..], &["--out", &out]].concat();
+    arguments.extend(logs.iter().map(String::as_str));
+    let printed = succeeds(&arguments);
+    assert!(printed.contains("threshold_db"), "{printed}");
+    let read = |name: &str| -> Value {
+        let text = fs::read_to_string(format!("{out}/{name}")).expect(name);
+        serde_json::from_str(&text).expect("JSON")
+    };
+    let of = read("survey.json")["fitted"]["numbers"][0].clone();
+    let number = |key: &str| of[key].as_f64().expect(key);
+    assert!((number("value") - number("assumed") + 3.0).abs() < 0.3, "{of}");
+    assert_eq!(of["is_determined"], true, "{of}");
+    let fitted = read("sensor.json")["threshold"].as_f64().expect("a number");
+    assert!((20.0 * (fitted / threshold).log10()).abs() < 0.3, "{fitted} {threshold}");
+    assert!(read("air.json").is_object());
+    let sensor = path(Path::new(&out), "sensor.json");
+    let scene = path(Path::new(&out), "scene.json");
+    succeeds(&["locate", &logs[0], "--scene", &scene, "--sensor", &sensor]);
+
+    let output = run(&["survey", &logs[0], &logs[1], "--fit", "walls", "--out", &out]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("walls can't be fitted by a survey"), "{}", stderr(&output));
+}

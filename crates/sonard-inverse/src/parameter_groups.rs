@@ -1,5 +1,6 @@
 //! Parameter groups by user-facing names, with default priors.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sonard_model::acoustics::Aperture;
 use thiserror::Error;
@@ -12,7 +13,7 @@ use crate::{
 };
 
 /// Group of parameters that are fitted together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum ParameterGroup {
@@ -52,6 +53,33 @@ pub enum ParameterGroup {
     Ends,
     /// Position and radius of each cylinder.
     Posts,
+}
+
+impl ParameterGroup {
+    /// User-facing name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Pose => "pose",
+            Self::Heading => "heading",
+            Self::Gear => "gear",
+            Self::Mounting => "mounting",
+            Self::Height => "height",
+            Self::Air => "air",
+            Self::Delay => "delay",
+            Self::Threshold => "threshold",
+            Self::Rise => "rise",
+            Self::Beam => "beam",
+            Self::Pulse => "pulse",
+            Self::Skirts => "skirts",
+            Self::Materials => "materials",
+            Self::Roughness => "roughness",
+            Self::Walls => "walls",
+            Self::Turns => "turns",
+            Self::Ends => "ends",
+            Self::Posts => "posts",
+        }
+    }
 }
 
 /// Invalid selection of parameters or priors.

@@ -42,6 +42,37 @@ pub struct ParameterReport {
 }
 
 impl ParameterReport {
+    /// Report of an estimate; `world` is the initial one.
+    #[must_use]
+    pub fn new(
+        world: &World,
+        sweeps: &[FitSweep],
+        prior: &Prior,
+        estimate: &ParameterEstimate,
+    ) -> Self {
+        let parameter = &prior.parameter;
+        let value = |by: f64| value(world, sweeps, parameter, by);
+        let (min, max) = world.limits(parameter);
+        let possible = |by: f64| value(by.clamp(min, max));
+        let half_width = HALF_WIDTH * estimate.sigma;
+        let per_unit = |sigma: f64| {
+            0.5 * (value(estimate.change + sigma) - value(estimate.change - sigma)).abs()
+        };
+        Self {
+            name: name(parameter, world),
+            scan: parameter.sweep().and_then(|at| sweeps.get(at)).map(|sweep| sweep.scan),
+            value: value(estimate.change),
+            change: value(estimate.change) - value(0.0),
+            sigma: per_unit(estimate.sigma),
+            low: possible(estimate.change - half_width),
+            high: possible(estimate.change + half_width),
+            prior: value(0.0),
+            prior_sigma: per_unit(prior.sigma),
+            identified: estimate.identified,
+            at_limit: estimate.change < min + ROUNDING || estimate.change > max - ROUNDING,
+        }
+    }
+
     /// Remark for a report.
     #[must_use]
     pub const fn remark(&self) -> &'static str {
@@ -96,30 +127,16 @@ impl FitResult {
         sweeps: &[FitSweep],
         fit: &FitOptions,
     ) -> Vec<ParameterReport> {
-        let of = |(prior, estimate): (&Prior, &ParameterEstimate)| {
-            let parameter = &prior.parameter;
-            let value = |by: f64| value(world, sweeps, parameter, by);
-            let (min, max) = world.limits(parameter);
-            let possible = |by: f64| value(by.clamp(min, max));
-            let half_width = HALF_WIDTH * estimate.sigma;
-            let per_unit = |sigma: f64| {
-                0.5 * (value(estimate.change + sigma) - value(estimate.change - sigma)).abs()
-            };
-            ParameterReport {
-                name: name(parameter, world),
-                scan: parameter.sweep().and_then(|at| sweeps.get(at)).map(|sweep| sweep.scan),
-                value: value(estimate.change),
-                change: value(estimate.change) - value(0.0),
-                sigma: per_unit(estimate.sigma),
-                low: possible(estimate.change - half_width),
-                high: possible(estimate.change + half_width),
-                prior: value(0.0),
-                prior_sigma: per_unit(prior.sigma),
-                identified: estimate.identified,
-                at_limit: estimate.change < min + ROUNDING || estimate.change > max - ROUNDING,
-            }
-        };
-        fit.priors.iter().zip(&self.estimates).map(of).collect()
+        let pairs = fit.priors.iter().zip(&self.estimates);
+        pairs
+            .map(|(prior, estimate)| ParameterReport::new(world, sweeps, prior, estimate))
+            .collect()
+    }
+
+    /// Calibrated sensor, with the sources of changed values.
+    #[must_use]
+    pub fn sensor(&self, started_from: &Sensor) -> Sensor {
+        calibrated_sensor(&self.world.sensor, started_from, "sonard calibrate")
     }
 
     /// Returns `true` if more than 30 % of the readings are not explained.
@@ -145,32 +162,31 @@ impl FitResult {
         found.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
         found
     }
+}
 
-    /// Calibrated sensor. If it differs from the initial one, it has a name of its own and a source
-    /// for each changed value.
-    #[must_use]
-    pub fn sensor(&self, started_from: &Sensor) -> Sensor {
-        let mut sensor = self.world.sensor.clone();
-        let before = started_from;
-        if sensor == *before {
-            return sensor;
-        }
-        sensor.name = format!("{}-calibrated", sensor.name);
-        let rise = sensor.threshold_rise_db_per_m != before.threshold_rise_db_per_m;
-        for (field, is_changed) in [
-            ("aperture", sensor.aperture != before.aperture),
-            ("threshold", sensor.threshold != before.threshold),
-            ("threshold_rise_db_per_m", rise),
-            ("mounting", sensor.mounting != before.mounting),
-            ("pulse", sensor.pulse != before.pulse),
-        ] {
-            if is_changed {
-                let source = "fitted by `sonard calibrate`: see report.md";
-                sensor.sources.insert(field.to_owned(), source.to_owned());
-            }
-        }
-        sensor
+/// Sensor fitted by a command. If it differs from the initial one, it has a name of its own and a
+/// source for each changed value.
+#[must_use]
+pub fn calibrated_sensor(fitted: &Sensor, before: &Sensor, command: &str) -> Sensor {
+    let mut sensor = fitted.clone();
+    if sensor == *before {
+        return sensor;
     }
+    sensor.name = format!("{}-calibrated", sensor.name);
+    let rise = sensor.threshold_rise_db_per_m != before.threshold_rise_db_per_m;
+    for (field, is_changed) in [
+        ("aperture", sensor.aperture != before.aperture),
+        ("threshold", sensor.threshold != before.threshold),
+        ("threshold_rise_db_per_m", rise),
+        ("mounting", sensor.mounting != before.mounting),
+        ("pulse", sensor.pulse != before.pulse),
+    ] {
+        if is_changed {
+            let source = format!("fitted by `{command}`: see report.md");
+            sensor.sources.insert(field.to_owned(), source);
+        }
+    }
+    sensor
 }
 
 /// Value of a parameter after a change, in the unit used in files.

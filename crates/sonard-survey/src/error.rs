@@ -1,6 +1,6 @@
 //! Errors of a survey.
 
-use sonard_inverse::WorldError;
+use sonard_inverse::{GroupError, ParameterGroup, WorldError};
 use sonard_model::scene::SceneError;
 use thiserror::Error;
 
@@ -19,6 +19,17 @@ pub enum SurveyError {
     /// Invalid scene.
     #[error(transparent)]
     Scene(#[from] SceneError),
+    /// Group of numbers that does not apply to the sensor.
+    #[error(transparent)]
+    Group(#[from] GroupError),
+    /// Group of numbers that a survey can't fit.
+    #[error("{} can't be fitted by a survey: {}", group.name(), names(fittable))]
+    NotFittable {
+        /// Group that was requested.
+        group: ParameterGroup,
+        /// Groups that can be fitted.
+        fittable: Vec<ParameterGroup>,
+    },
     /// Invalid assumption.
     #[error("{name} is {value}: it must be {expected}")]
     Option {
@@ -29,4 +40,10 @@ pub enum SurveyError {
         /// Valid range, in words.
         expected: &'static str,
     },
+}
+
+/// Advice for a group that can't be fitted.
+fn names(fittable: &[ParameterGroup]) -> String {
+    let names: Vec<&str> = fittable.iter().map(|group| group.name()).collect();
+    format!("it fits {}", names.join(", "))
 }

@@ -206,7 +206,7 @@ impl<'a> Judge<'a> {
         self.workspace.scores.get_or(digest, sum)
     }
 
-    /// Digest of walls, posts, poses, standard deviation of ranges and freedom of headings.
+    /// Digest of walls, posts, poses, standard deviation of ranges, freedom of headings, and sensor.
     fn digest(&self, segments: &[Segment]) -> u64 {
         let mut hasher = DefaultHasher::new();
         segments.len().hash(&mut hasher);
@@ -218,6 +218,7 @@ impl<'a> Judge<'a> {
             value.to_bits().hash(&mut hasher);
         }
         self.are_headings_free.hash(&mut hasher);
+        self.workspace.sensor.hash(&mut hasher);
         hasher.finish()
     }
 

@@ -46,6 +46,7 @@ mod room;
 mod rows;
 mod scores;
 mod search;
+mod sensor_fit;
 mod slam;
 mod spots;
 mod square;
@@ -64,8 +65,8 @@ pub use options::SurveyOptions;
 pub use post::PostShape;
 pub use progress::{NoObserver, SurveyObserver, SurveyProgress, SurveyStage};
 pub use result::{
-    AlternativePlan, PieceStatus, ReadingCause, SearchEnd, Survey, SurveyedEnd, SurveyedPose,
-    SurveyedPost, SurveyedWall, UnexplainedArc, WallPiece,
+    AlternativePlan, FittedNumber, PieceStatus, ReadingCause, SearchEnd, SensorFit, Survey,
+    SurveyedEnd, SurveyedPose, SurveyedPost, SurveyedWall, UnexplainedArc, WallPiece,
 };
 pub use room::unknown_room;
 pub use scores::PlanScores;

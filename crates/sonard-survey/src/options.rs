@@ -1,9 +1,11 @@
 //! Assumptions and limits of a survey.
 
+use sonard_inverse::ParameterGroup;
+
 use crate::{error::SurveyError, odometry::OdometrySigma};
 
 /// Assumptions and limits of a survey.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct SurveyOptions {
     /// Errors of the sweeps' poses as odometry; `None` to ignore these poses.
     pub odometry: Option<OdometrySigma>,
@@ -20,6 +22,8 @@ pub struct SurveyOptions {
     pub square_deg: Option<f64>,
     /// Amplitude reflection coefficient of all walls, 0 to 1.
     pub reflectance: f64,
+    /// Groups of numbers of sensor and air that are fitted together with the plan.
+    pub fit: Vec<ParameterGroup>,
     /// Maximum number of scored scenes.
     pub max_scenes: usize,
 }
@@ -33,6 +37,7 @@ impl Default for SurveyOptions {
             min_arc_beams: None,
             square_deg: None,
             reflectance: 0.97,
+            fit: Vec::new(),
             max_scenes: 30_000,
         }
     }

@@ -10,6 +10,7 @@ use crate::{
     judge::Judge,
     normal::{NormalEquations, pose_column},
     posed::{LineColumns, PosedPlan},
+    sensor_fit::FreeNumbers,
     trace::explain,
 };
 
@@ -22,7 +23,14 @@ const SPREADS_DB: [f64; 6] = [0.35, 0.5, 0.7, 1.0, 1.5, 2.5];
 /// Limits of the standard deviation of ranges, metres.
 const SIGMA_M: [f64; 2] = [0.0005, 0.02];
 
-/// Log-likelihood of all sweeps with the normal equations of poses and lines.
+/// Plan, poses, and numbers of sensor and air, which are estimated together.
+#[derive(Debug, Clone)]
+struct Estimate {
+    posed: PosedPlan,
+    numbers: FreeNumbers,
+}
+
+/// Log-likelihood of all sweeps with the normal equations of poses, lines, posts and numbers.
 struct Linearized {
     value: f64,
     normal: NormalEquations,
@@ -32,39 +40,75 @@ struct Linearized {
 /// the ends of arcs. Directions are tied to a square axis if the survey assumes one. Returns `None` if the
 /// normal equations have no solution.
 pub(crate) fn polish(posed: &mut PosedPlan, judge: &Judge) -> Option<()> {
-    let rough = error_model(posed, judge)?;
-    climb(posed, judge, &rough)?;
-    let errors = likeliest_spread(posed, judge, &error_model(posed, judge)?)?;
-    climb(posed, judge, &errors)
+    let (polished, _) = polish_with(posed, judge, FreeNumbers::none())?;
+    *posed = polished.posed;
+    Some(())
+}
+
+/// Improves poses, lines and posts as [`polish`], together with numbers of sensor and air; returns
+/// these with their covariance.
+pub(crate) fn fit_numbers(
+    posed: &mut PosedPlan,
+    judge: &Judge,
+    numbers: FreeNumbers,
+) -> Option<(FreeNumbers, Option<DMatrix<f64>>)> {
+    let count = numbers.count();
+    let (fitted, linear) = polish_with(posed, judge, numbers)?;
+    let covariance = linear.normal.covariance();
+    let own = covariance.map(|of| {
+        let first = of.nrows() - count;
+        of.view((first, first), (count, count)).into_owned()
+    });
+    *posed = fitted.posed;
+    Some((fitted.numbers, own))
+}
+
+fn polish_with(
+    posed: &PosedPlan,
+    judge: &Judge,
+    numbers: FreeNumbers,
+) -> Option<(Estimate, Linearized)> {
+    let mut estimate = Estimate { posed: posed.clone(), numbers };
+    let rough = error_model(&estimate.posed, judge)?;
+    climb(&mut estimate, judge, &rough)?;
+    let errors = error_model(&estimate.posed, judge)?;
+    let errors = likeliest_spread(&estimate, judge, &errors)?;
+    let linear = climb(&mut estimate, judge, &errors)?;
+    Some((estimate, linear))
 }
 
 /// Maximizes the likelihood under an error model.
-fn climb(posed: &mut PosedPlan, judge: &Judge, errors: &ErrorModel) -> Option<()> {
-    let mut best = linearize(posed, judge, errors)?;
+fn climb(estimate: &mut Estimate, judge: &Judge, errors: &ErrorModel) -> Option<Linearized> {
+    let workspace = judge.workspace;
+    let mut best = linearize(estimate, judge, errors)?;
     let mut damping = 1e-3;
     for _ in 0..MAX_STEPS {
         let step = best.normal.step(damping)?;
-        let tried = posed.moved(&LineColumns::new(posed), &step, judge.workspace.reach_m());
+        let columns = LineColumns::new(&estimate.posed);
+        let tried = Estimate {
+            posed: estimate.posed.moved(&columns, &step, workspace.reach_m()),
+            numbers: estimate.numbers.moved(&step.as_slice()[columns.count()..], &workspace.world),
+        };
         let Some(at) = linearize(&tried, judge, errors) else { break };
         let gain = at.value - best.value;
         if gain <= 0.0 {
             damping *= 30.0;
             continue;
         }
-        (*posed, best, damping) = (tried, at, 0.1 * damping);
+        (*estimate, best, damping) = (tried, at, 0.1 * damping);
         if gain < MIN_GAIN {
             break;
         }
     }
-    Some(())
+    Some(best)
 }
 
 /// Error model with the scatter of the threshold that is most likely.
-fn likeliest_spread(posed: &PosedPlan, judge: &Judge, errors: &ErrorModel) -> Option<ErrorModel> {
+fn likeliest_spread(estimate: &Estimate, judge: &Judge, errors: &ErrorModel) -> Option<ErrorModel> {
     let of = |sigma_db: f64| ErrorModel { sigma_db, ..*errors };
     let scored = SPREADS_DB.iter().filter_map(|&sigma_db| {
         let errors = of(sigma_db);
-        Some((linearize(posed, judge, &errors)?.value, errors))
+        Some((linearize(estimate, judge, &errors)?.value, errors))
     });
     scored.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, errors)| errors)
 }
@@ -97,10 +141,12 @@ fn absolute_errors_m(posed: &PosedPlan, judge: &Judge) -> Option<Vec<f64>> {
 }
 
 /// Predicts all sweeps with their derivatives.
-fn linearize(posed: &PosedPlan, judge: &Judge, errors: &ErrorModel) -> Option<Linearized> {
+fn linearize(estimate: &Estimate, judge: &Judge, errors: &ErrorModel) -> Option<Linearized> {
+    let Estimate { posed, numbers } = estimate;
     let workspace = judge.workspace;
     let segments = posed.plan.segments(&posed.walls);
     let mut world = workspace.world.clone();
+    world.sensor.mounting.left_m = workspace.left_m;
     world.scene = std::sync::Arc::new(judge.with_posts(&posed.posts).scene_of(&segments));
     let mut parameters = vec![Parameter::X(0), Parameter::Y(0), Parameter::Heading(0)];
     parameters.extend((0..segments.len()).map(Parameter::Wall));
@@ -108,16 +154,18 @@ fn linearize(posed: &PosedPlan, judge: &Judge, errors: &ErrorModel) -> Option<Li
     let parts = [PostPart::X, PostPart::Y, PostPart::Radius];
     let of_post = |post: usize| parts.map(|part| Parameter::Post(post, part));
     parameters.extend((0..posed.posts.len()).flat_map(of_post));
-    let hypotheses = Hypotheses::new(world, parameters).ok()?;
+    parameters.extend(numbers.parameters());
+    let hypotheses = Hypotheses::new(numbers.changed(&world)?, parameters).ok()?;
     let of_sweep = |(sweep, pose)| hypotheses.log_likelihood(sweep, pose, errors).ok();
     let pairs = workspace.sweeps.par_iter().zip(&posed.poses);
     let all: Option<Vec<LogLikelihood>> = pairs.map(of_sweep).collect();
     let columns = LineColumns::new(posed);
-    let mut normal = NormalEquations::new(columns.count());
+    let mut normal = NormalEquations::new(columns.count() + numbers.count());
     let mut value = 0.0;
     for (sweep, likelihood) in all?.iter().enumerate() {
         value += likelihood.value;
-        let map = parameter_columns(posed, &segments, &columns, sweep);
+        let mut map = parameter_columns(posed, &segments, &columns, sweep);
+        map.extend((0..numbers.count()).map(|at| vec![(columns.count() + at, 1.0)]));
         add_mapped(&mut normal, &map, &likelihood.gradient, &likelihood.information);
     }
     for (at, step) in workspace.moves.iter().enumerate() {
@@ -131,6 +179,7 @@ fn linearize(posed: &PosedPlan, judge: &Judge, errors: &ErrorModel) -> Option<Li
         columns.add_square(&mut normal, &posed.plan, sigma_rad);
         value -= normal.loss() - before;
     }
+    value -= numbers.add_priors(&mut normal, columns.count());
     Some(Linearized { value, normal })
 }
 

@@ -10,13 +10,12 @@ use crate::{
     arrangement::LineArrangement,
     covariance::PlanCovariance,
     judge::{Judge, Predictions, outcome_of},
-    options::SurveyOptions,
     posed::PosedPlan,
     posts::evidence_nats,
     readings::{Beam, Outcome},
     result::{
-        AlternativePlan, PieceStatus, ReadingCause, SearchEnd, Survey, SurveyedEnd, SurveyedPose,
-        SurveyedPost, SurveyedWall, UnexplainedArc,
+        AlternativePlan, PieceStatus, ReadingCause, SearchEnd, SensorFit, Survey, SurveyedEnd,
+        SurveyedPose, SurveyedPost, SurveyedWall, UnexplainedArc,
     },
     rows::direct_post,
     spots::consistent_arcs,
@@ -36,7 +35,7 @@ pub(crate) fn report(
     assessment: &Assessment,
     covariance: &Option<PlanCovariance>,
     workspace: &Workspace,
-    (end, options): (SearchEnd, &SurveyOptions),
+    (end, reflectance, fitted): (SearchEnd, f64, Option<SensorFit>),
 ) -> Survey {
     let judge = Judge::of(workspace, posed, workspace.errors.final_sigma_m());
     let explained_m = workspace.errors.explained_m();
@@ -99,7 +98,8 @@ pub(crate) fn report(
         probability,
         end,
         scored_scenes: workspace.scored(),
-        reflectance: options.reflectance,
+        reflectance,
+        fitted,
     }
 }
 

@@ -3,10 +3,13 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sonard_model::{
+    acoustics::Sensor,
     geometry::Pose,
     scene::{Scene, SceneBuilder},
 };
 use uuid::Uuid;
+
+use crate::room::MATERIAL;
 
 /// Floor plan and poses that explain the readings of sweeps, with what they leave undetermined.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -37,8 +40,46 @@ pub struct Survey {
     pub end: SearchEnd,
     /// Number of different scenes scored.
     pub scored_scenes: usize,
-    /// Amplitude reflection coefficient assumed for all walls, 0 to 1.
+    /// Amplitude reflection coefficient of all walls, assumed or fitted, 0 to 1.
     pub reflectance: f64,
+    /// Numbers of sensor and air that were fitted; `None` if all are assumed.
+    #[serde(default)]
+    pub fitted: Option<SensorFit>,
+}
+
+/// Numbers of sensor and air, fitted together with plan and poses.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SensorFit {
+    /// Estimates.
+    pub numbers: Vec<FittedNumber>,
+    /// Sensor with the estimates.
+    pub sensor: Sensor,
+    /// Speed of sound with the estimates, m/s.
+    pub sound_speed_m_s: f64,
+    /// Offset of all ranges, metres.
+    pub delay_m: f64,
+}
+
+/// Estimate of a number, in the unit of its name. Plan and poses are estimated with it, so the
+/// interval includes their uncertainty.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct FittedNumber {
+    /// Name, as of `sonard calibrate`.
+    pub name: String,
+    /// Estimate.
+    pub value: f64,
+    /// Standard deviation.
+    pub sigma: f64,
+    /// Ends of the 95 % interval.
+    pub interval: [f64; 2],
+    /// Assumed value, the mean of the prior.
+    pub assumed: f64,
+    /// Standard deviation of the prior.
+    pub assumed_sigma: f64,
+    /// The readings determine the number to less than half the standard deviation of its prior.
+    pub is_determined: bool,
+    /// Names of other numbers that can hardly be separated from it (correlation above 0.95).
+    pub coupled_with: Vec<String>,
 }
 
 /// Wall of a plan.
@@ -215,8 +256,6 @@ impl Survey {
         scene
     }
 }
-
-const MATERIAL: &str = "wall";
 
 /// Rounds to a hundredth of a millimetre.
 fn rounded(metres: f64) -> f64 {

@@ -1,5 +1,7 @@
 //! Survey as a whole.
 
+use std::collections::HashSet;
+
 use sonard_inverse::{FitSweep, World};
 use sonard_model::geometry::{DVec2, Pose};
 
@@ -15,7 +17,7 @@ use crate::{
     judge::Judge,
     odometry::Move,
     options::SurveyOptions,
-    polish::polish,
+    polish::{fit_numbers, polish},
     pose_grid::improve_poses,
     posed::PosedPlan,
     post::PostShape,
@@ -30,6 +32,7 @@ use crate::{
     room::empty_world,
     scores::PlanScores,
     search::{PlanSearch, initial_walls},
+    sensor_fit::SensorFitter,
     slam::{
         VirtualMap, are_same_course, map_of_poses, orders, reassociated, virtual_map,
         virtual_map_in_order,
@@ -68,6 +71,8 @@ const UNCERTAIN_SHARE: f64 = 0.2;
 const MIN_ROUND_GAIN: f64 = 0.5;
 const LAST_ROUND: &Round = &ROUNDS[ROUNDS.len() - 1];
 const REFINE_STEPS: usize = 4;
+/// Maximum number of searches with another sensor, each after a fit.
+const MAX_SENSOR_FITS: usize = 3;
 /// Share of the budget for the search; the rest is for alternatives.
 const SEARCH_SHARE: f64 = 0.7;
 
@@ -100,16 +105,35 @@ pub fn resume_survey(
     scores: &PlanScores,
     observer: &dyn SurveyObserver,
 ) -> Result<Survey, SurveyError> {
-    let workspace = workspace(world, sweeps, options, (observer, scores))?;
-    workspace.limit_scenes((SEARCH_SHARE * options.max_scenes as f64) as usize);
-    let mut search = SurveySearch::new(&workspace, options);
-    search.run();
-    let early_end = search.early_end();
-    workspace.limit_scenes(options.max_scenes);
-    search.report_progress(SurveyStage::Alternatives);
-    let assessment = search.settle();
-    let end = early_end.unwrap_or_else(|| search.last_end());
-    Ok(report(sweeps, &search.posed, &assessment, &search.covariance, &workspace, (end, options)))
+    let mut fitter = SensorFitter::new(world, options)?;
+    let mut scored = HashSet::new();
+    let mut last: Option<PosedPlan> = None;
+    for round in 1.. {
+        let (world, reflectance) = fitter.world()?;
+        let options = &SurveyOptions { reflectance, ..options.clone() };
+        let workspace = workspace(&world, sweeps, options, (observer, scores))?;
+        let workspace = workspace.following(scored, fitter.digest());
+        workspace.limit_scenes((SEARCH_SHARE * options.max_scenes as f64) as usize);
+        let mut search = SurveySearch::new(&workspace, options);
+        match last.take() {
+            Some(last) => search.run_after(last),
+            None => search.run(),
+        }
+        let early_end = search.early_end();
+        if search.fit_sensor(&mut fitter) && early_end.is_none() && round <= MAX_SENSOR_FITS {
+            last = Some(search.posed);
+            scored = workspace.into_scored();
+            continue;
+        }
+        workspace.limit_scenes(options.max_scenes);
+        search.report_progress(SurveyStage::Alternatives);
+        let assessment = search.settle();
+        let end = early_end.unwrap_or_else(|| search.last_end());
+        let (posed, covariance) = (&search.posed, &search.covariance);
+        let stated = (end, fitter.world()?.1, fitter.report()?);
+        return Ok(report(sweeps, posed, &assessment, covariance, &workspace, stated));
+    }
+    unreachable!("the last round returns")
 }
 
 /// Score of given walls (pairs of ends, metres), posts and poses, nats, as that of a [`Survey`].
@@ -169,6 +193,7 @@ pub(crate) fn workspace<'a>(
     }
     options.check()?;
     let errors = RangeErrors::new(&world.sensor, options);
+    let left_m = world.sensor.mounting.left_m;
     let world = &empty_world(world, options.reflectance);
     let simulator = world.simulator(&sweeps[0].pose)?;
     let max_range_m = simulator.receiver().max_range_m;
@@ -179,7 +204,8 @@ pub(crate) fn workspace<'a>(
     let moves = options.odometry.map_or_else(Vec::new, between);
     let square_rad = options.square_deg.map(f64::to_radians);
     let model = (world.clone(), simulator);
-    let workspace = Workspace::new(model, sweeps, (readings, errors), square_rad, moves, watched);
+    let workspace = Workspace::new(model, sweeps, (readings, errors), square_rad, moves, watched)
+        .with_left_m(left_m);
     let without = workspace.arcs.iter().zip(sweeps).find(|(arcs, _)| arcs.is_empty());
     match without {
         Some((_, sweep)) => Err(SurveyError::NoArcs(sweep.scan)),
@@ -262,6 +288,26 @@ impl<'a> SurveySearch<'a> {
         }
     }
 
+    /// Continues from the plan of a search with another sensor; where arcs remain unexplained, also
+    /// searches from the course, and keeps the better plan.
+    fn run_after(&mut self, last: PosedPlan) {
+        let course = self.state();
+        let workspace = self.workspace;
+        self.begin(map_of_poses(&workspace.arcs, last.poses.clone(), &workspace.moves));
+        self.posed = last;
+        self.rounds(1);
+        self.find_boxes();
+        if self.left().is_empty() || workspace.is_over() {
+            return;
+        }
+        let continued = self.state();
+        self.restore(course);
+        self.run();
+        if self.score < continued.score {
+            self.restore(continued);
+        }
+    }
+
     fn map_in_order(&self, order: &[usize]) -> VirtualMap<'a> {
         let workspace = self.workspace;
         let odometry = |sweep: &usize| workspace.readings[*sweep].odometry;
@@ -296,6 +342,18 @@ impl<'a> SurveySearch<'a> {
             }
         }
         self.find_boxes();
+    }
+
+    /// Fits numbers of sensor and air together with the plan found; returns `true` if they changed
+    /// enough for another search.
+    fn fit_sensor(&mut self, fitter: &mut SensorFitter) -> bool {
+        if fitter.is_empty() {
+            return false;
+        }
+        let sigma_m = self.errors().final_sigma_m();
+        let judge = Judge::of(self.workspace, &self.posed, sigma_m);
+        let fitted = fit_numbers(&mut self.posed, &judge, fitter.numbers());
+        fitted.is_some_and(|(numbers, covariance)| fitter.update(&numbers, covariance))
     }
 
     /// Completes boxes of which faces are found, or echoes remain unexplained, one after the other.

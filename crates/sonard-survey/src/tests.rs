@@ -4,6 +4,7 @@ mod boxes;
 mod coarse;
 mod posts;
 mod rectangle;
+mod sensor_fit;
 mod stages;
 mod undetermined;
 

@@ -37,6 +37,10 @@ pub(crate) struct Workspace<'a> {
     pub(crate) moves: Vec<Move>,
     pub(crate) observer: &'a dyn SurveyObserver,
     pub(crate) scores: &'a PlanScores,
+    /// Offset of the face to the left of the axis, metres, which only final estimates include.
+    pub(crate) left_m: f64,
+    /// Digest of the sensor and air assumed, by which scores of plans differ.
+    pub(crate) sensor: u64,
     scored: Mutex<HashSet<u64>>,
     limit: AtomicUsize,
 }
@@ -64,9 +68,27 @@ impl<'a> Workspace<'a> {
             moves,
             observer,
             scores,
+            left_m: 0.0,
+            sensor: 0,
             scored: Mutex::default(),
             limit,
         }
+    }
+
+    /// Workspace with another digest of sensor and air, whose budget counts the scenes of an earlier
+    /// search.
+    pub(crate) fn following(self, scored: HashSet<u64>, sensor: u64) -> Self {
+        Self { scored: Mutex::new(scored), sensor, ..self }
+    }
+
+    /// Workspace with the face left of the axis, metres.
+    pub(crate) fn with_left_m(self, left_m: f64) -> Self {
+        Self { left_m, ..self }
+    }
+
+    /// Digests of the scenes scored so far.
+    pub(crate) fn into_scored(self) -> HashSet<u64> {
+        self.scored.into_inner().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Maximum range of the ranger, metres: the region around the poses with walls.

@@ -332,6 +332,32 @@ class SurveyedPost:
         return f"<SurveyedPost '{self.id}': ({x:.3f}, {y:.3f}) m, radius {self.radius_m:.3f} m, {self.status}>"
 
 
+@dataclass(frozen=True, slots=True, repr=False)
+class FittedNumber:
+    """Number of sensor or air, fitted together with a surveyed plan."""
+
+    name: str
+    """Name, as of the estimates of ``calibrate``."""
+    value: float
+    """Estimate, in the unit of the name."""
+    sigma: float
+    """Standard deviation."""
+    interval: tuple[float, float]
+    """Ends of the 95 % interval."""
+    assumed: float
+    """Assumed value, the mean of the prior."""
+    assumed_sigma: float
+    """Standard deviation of the prior."""
+    is_determined: bool
+    """The readings determine the number to less than half the standard deviation of its prior."""
+    coupled_with: tuple[str, ...]
+    """Names of other numbers that can hardly be separated from it (correlation above 0.95)."""
+
+    def __repr__(self) -> str:
+        remark = "" if self.is_determined else ", not determined"
+        return f"<FittedNumber '{self.name}': {self.value:.4g} ± {self.sigma:.2g}{remark}>"
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class AlternativePlan:
     """Floor plan that explains the readings nearly as well as the best one."""
@@ -399,10 +425,14 @@ class Survey:
     scored_scenes: int
     """Number of floor plans whose readings were predicted."""
     reflectance: float
-    """Amplitude reflection coefficient assumed for all walls."""
+    """Amplitude reflection coefficient of all walls, assumed or fitted."""
+    fitted: tuple[FittedNumber, ...]
+    """Numbers of sensor and air that were fitted."""
+    sensor: Sensor | None
+    """Sensor with the fitted numbers; ``None`` without a fit."""
 
     @classmethod
-    def _from_dict(cls, found: dict[str, Any], scene: Scene) -> Survey:
+    def _from_dict(cls, found: dict[str, Any], scene: Scene, sensor: Sensor | None) -> Survey:
         poses = found["poses"]
         nothing = [None, None]
         sigmas = [[*(pose["sigma_m"] or nothing), pose["sigma_heading_deg"]] for pose in poses]
@@ -426,6 +456,8 @@ class Survey:
             causes=tuple(tuple(causes) for causes in found["causes"]),
             scored_scenes=found["scored_scenes"],
             reflectance=found["reflectance"],
+            fitted=tuple(_fitted_number(of) for of in (found["fitted"] or {"numbers": ()})["numbers"]),
+            sensor=sensor,
         )
 
     def __repr__(self) -> str:
@@ -439,6 +471,11 @@ class Survey:
 def _pose_rows(poses: list[dict[str, float]]) -> NDArray[np.float64]:
     rows = [[pose["x_m"], pose["y_m"], pose["heading_deg"]] for pose in poses]
     return np.array(rows, dtype=float).reshape(-1, 3)
+
+
+def _fitted_number(of: dict[str, Any]) -> FittedNumber:
+    low, high = of["interval"]
+    return FittedNumber(**(of | {"interval": (low, high), "coupled_with": tuple(of["coupled_with"])}))
 
 
 def _surveyed_post(post: dict[str, Any]) -> SurveyedPost:

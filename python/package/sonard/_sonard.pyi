@@ -461,6 +461,7 @@ def survey(
     square: bool = False,
     max_range_m: float = 5.0,
     reflectance: float = 0.97,
+    fit: Sequence[str] = (),
     max_scenes: int = 30000,
     closed: bool = False,
     progress: Callable[[dict[str, Any]], object] | None = None,

@@ -2,25 +2,32 @@
 
 use std::path::Path;
 
+use serde::Serialize;
+
 use super::{Args, Input, picture, summary};
 use crate::{
     cli::{
         Failure, Outcome,
         output::{Overwrite, Product, make_folder},
     },
+    scan::AirRecord,
     survey::Survey,
 };
 
 const FILES: [&str; 4] = ["scene.json", "poses.csv", "survey.json", "report.md"];
+/// Files of fitted numbers.
+const FITTED_FILES: [&str; 2] = ["sensor.json", "air.json"];
 
 /// Checks, before any work, that the files may be written to the folder.
 ///
 /// # Errors
 ///
 /// A file that may not be replaced.
-pub(super) fn check(folder: &Path, overwrite: Overwrite) -> Outcome {
-    let texts = FILES.map(|name| (name, Product::Log));
-    let all = texts.into_iter().chain(picture::FILES);
+pub(super) fn check(args: &Args, overwrite: Overwrite) -> Outcome {
+    let folder: &Path = &args.out;
+    let fitted = if args.fit.is_empty() { &[][..] } else { &FITTED_FILES[..] };
+    let texts = FILES.iter().chain(fitted).map(|name| (*name, Product::Log));
+    let all = texts.chain(picture::FILES);
     all.into_iter().try_for_each(|(name, product)| overwrite.check_in(folder, name, product))
 }
 
@@ -35,12 +42,24 @@ pub(super) fn write(args: &Args, overwrite: Overwrite, input: &Input, found: &Su
     scene.build().map_err(|error| {
         Failure::input(error, "the survey found no walls: give sweeps with more echoes")
     })?;
-    let json = serde_json::to_string_pretty(found).unwrap_or_default() + "\n";
-    let contents = [scene.text(), poses(found), json, summary::markdown(input, found)];
+    let contents = [scene.text(), poses(found), json(found), summary::markdown(input, found)];
     FILES.iter().zip(contents).try_for_each(|(name, text)| {
         overwrite.save(&args.out.join(name), Product::Log, text.as_bytes())
     })?;
+    if let Some(fitted) = &found.fitted {
+        let air = &input.world.air;
+        let air = air.with_temperature_for_sound_speed(fitted.sound_speed_m_s);
+        let air = AirRecord::from(&air.unwrap_or(input.world.air));
+        for (name, text) in FITTED_FILES.iter().zip([json(&fitted.sensor), json(&air)]) {
+            overwrite.save(&args.out.join(name), Product::Log, text.as_bytes())?;
+        }
+    }
     picture::write(args, overwrite, input, found)
+}
+
+/// Serializes a value as lines of JSON.
+fn json(value: &impl Serialize) -> String {
+    serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
 }
 
 /// Poses as CSV with their standard deviations.

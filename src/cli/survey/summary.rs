@@ -102,6 +102,7 @@ fn status_length_m(wall: &SurveyedWall, status: PieceStatus) -> f64 {
 const WALL_HEAD: [&str; 7] =
     ["wall", "from m", "to m", "across \u{b1} mm", "observed m", "implied m", "conjectured m"];
 const POST_HEAD: [&str; 6] = ["post", "x m", "y m", "radius mm", "\u{b1} mm, radius", "status"];
+const FIT_HEAD: [&str; 5] = ["fitted", "value", "\u{b1}", "assumed", "remark"];
 const POSE_HEAD: [&str; 5] = ["stop", "x m", "y m", "heading deg", "\u{b1} mm, deg"];
 
 fn wall_row(wall: &SurveyedWall) -> [String; 7] {
@@ -127,6 +128,31 @@ fn post_row(post: &SurveyedPost) -> [String; 6] {
     };
     let [x, y] = post.center_m.map(|m| format!("{m:.4}"));
     [post.id.clone(), x, y, format!("{:.1}", 1e3 * post.radius_m), sigma, status.to_owned()]
+}
+
+/// Rows of fitted numbers; none without a fit.
+fn fit_rows(found: &Survey) -> impl Iterator<Item = [String; 5]> + '_ {
+    let numbers = found.fitted.iter().flat_map(|fitted| &fitted.numbers);
+    numbers.map(|of| {
+        let mut remarks = Vec::new();
+        if !of.is_determined {
+            remarks.push("left at its prior".to_owned());
+        }
+        if of.name == "sound_speed" && !of.is_determined {
+            remarks.push("coupled to all dimensions".to_owned());
+        }
+        if !of.coupled_with.is_empty() {
+            remarks.push(format!("coupled to {}", of.coupled_with.join(", ")));
+        }
+        let number = |value: f64| format!("{value:.4}");
+        [
+            of.name.clone(),
+            number(of.value),
+            number(of.sigma),
+            number(of.assumed),
+            remarks.join("; "),
+        ]
+    })
 }
 
 fn pose_rows(found: &Survey) -> impl Iterator<Item = [String; 5]> + '_ {
@@ -162,6 +188,14 @@ pub(super) fn print(out: &mut impl Write, input: &Input, found: &Survey) -> io::
         align_right(&mut posts, 1..5);
         writeln!(out, "{}", fit(posts))?;
     }
+    if found.fitted.is_some() {
+        let mut numbers = ruled(FIT_HEAD);
+        fit_rows(found).for_each(|row| {
+            numbers.add_row(row);
+        });
+        align_right(&mut numbers, 1..4);
+        writeln!(out, "{}", fit(numbers))?;
+    }
     let mut poses = ruled(POSE_HEAD);
     pose_rows(found).for_each(|row| {
         poses.add_row(row);
@@ -183,6 +217,10 @@ pub(super) fn markdown(input: &Input, found: &Survey) -> String {
     text += "\n";
     if !found.posts.is_empty() {
         text += &table(&POST_HEAD, found.posts.iter().map(|post| post_row(post).to_vec()));
+        text += "\n";
+    }
+    if found.fitted.is_some() {
+        text += &table(&FIT_HEAD, fit_rows(found).map(|row| row.to_vec()));
         text += "\n";
     }
     text += &table(&POSE_HEAD, pose_rows(found).map(|row| row.to_vec()));

@@ -69,6 +69,19 @@ fn surveys_as_the_command_does() {
     assert_eq!(found.scene, Some(scene));
     assert_eq!(found.floor_plan.expect("a plan").walls.len(), 4);
 
+    // Numbers of the ranger are fitted on request.
+    let with_fit = |fit: &str| {
+        let request = json!({"scans": scans, "max_range_m": 4, "fit": [fit]}).to_string();
+        daemon.send("POST", "/v1/survey", &request)
+    };
+    let fitted = result(&with_fit("threshold")).survey.fitted.expect("a fit");
+    let of = &fitted.numbers[0];
+    assert!(of.is_determined && (of.value - of.assumed).abs() < 0.3, "{of:?}");
+    let rejected = with_fit("walls");
+    assert_eq!(rejected.status, 422);
+    let error = rejected.json()["error"].to_string();
+    assert!(error.contains("walls can't be fitted by a survey"), "{error}");
+
     // Uploaded, the same readings give the same walls.
     let sweeps = scans.iter().map(|scan| {
         let path = format!("/v1/scans/{}", scan.as_str().expect("an id"));

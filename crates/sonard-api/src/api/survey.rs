@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use sonard_inverse::ParameterGroup;
 use sonard_model::geometry::Pose;
 use sonard_records::FloorPlan;
 use sonard_survey::{OdometrySigma, Survey, SurveyOptions, SurveyProgress};
@@ -12,6 +13,8 @@ use uuid::Uuid;
 pub const MAX_SURVEYED_SWEEPS: usize = 40;
 /// Maximum number of readings of an uploaded sweep.
 pub const MAX_UPLOADED_BEAMS: usize = 4000;
+/// Maximum number of groups of numbers that a survey fits.
+const MAX_FITTED_GROUPS: usize = 10;
 /// Maximum budget of a survey, scored floor plans.
 pub const MAX_SURVEY_SCENES: usize = 100_000;
 
@@ -49,6 +52,11 @@ pub struct SurveyRequest {
     #[serde(default = "default_reflectance")]
     #[schemars(range(min = 0.05, max = 1))]
     pub reflectance: f64,
+    /// Numbers of sensor and air that are fitted together with the plan: threshold, rise, mounting,
+    /// materials (the reflectance), air, delay, gear, beam, skirts or pulse.
+    #[serde(default)]
+    #[schemars(length(max = MAX_FITTED_GROUPS))]
+    pub fit: Vec<ParameterGroup>,
     /// Maximum number of floor plans whose readings are predicted.
     #[serde(default = "default_max_scenes")]
     #[schemars(range(min = 100, max = MAX_SURVEY_SCENES))]

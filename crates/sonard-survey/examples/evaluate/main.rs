@@ -7,11 +7,12 @@
 mod intervals;
 mod measure;
 mod rooms;
+mod sensor;
 mod simulate;
 
 use std::{error::Error, sync::Arc};
 
-use sonard_inverse::World;
+use sonard_inverse::{ParameterGroup, World};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::{DVec2, Pose},
@@ -28,6 +29,7 @@ use measure::{
     Ends, RigidMotion, corner_errors_m, coverage, explained, is_post_at, median, reflecting_walls,
 };
 use rooms::{RoomKind, add_posts, draw_course, draw_place, draw_room, drift, generator};
+use sensor::{Deviation, TrueSensor, print_deviations};
 use simulate::{ReadingNoise, sweeps};
 
 /// Settings of an evaluation.
@@ -40,6 +42,8 @@ struct Settings {
     odometry_is_used: bool,
     square_deg: Option<f64>,
     noise: ReadingNoise,
+    truth: TrueSensor,
+    fit: Vec<ParameterGroup>,
     is_verbose: bool,
     prints_walls: bool,
 }
@@ -65,6 +69,8 @@ struct Trial {
     /// Length of walls reported as observed that are none, metres.
     wrong_observed_m: f64,
     intervals: Intervals,
+    /// Numbers fitted, as errors in standard deviations, with the name.
+    fitted: Vec<Deviation>,
     /// An alternative is the true room.
     is_listed: bool,
     /// No other plan found scores within 10 nats of the true room.
@@ -116,6 +122,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             trials.push(trial);
         }
         print_summary(kind, &trials);
+        print_fitted(&trials);
         all.extend(trials);
     }
     print_intervals(&all.iter().map(|trial| trial.intervals).collect::<Vec<_>>());
@@ -134,7 +141,8 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
     }
     let sensor = Sensor::preset("senscomp-6500")?;
     let options = Options { max_range_m: Some(MAX_RANGE_M), ..Options::default() };
-    let world = World::new(Arc::new(room), sensor, Air::default(), options);
+    let assumed = World::new(Arc::new(room), sensor, Air::default(), options);
+    let world = settings.truth.applied(&assumed)?;
     let odometry = drift(&poses, settings.odometry, &mut random);
     let mut readings = sweeps(&world, &poses, settings.beams, settings.noise, &mut random)?;
     let held: Vec<Pose> = (0..HELD_PLACES)
@@ -143,8 +151,7 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
             Pose { x_m: place.x, y_m: place.y, heading_deg: 45.0 * at as f64 }
         })
         .collect();
-    let held_noise = ReadingNoise { offset_db: settings.noise.offset_db, ..settings.noise };
-    let held_out = sweeps(&world, &held, settings.beams, held_noise, &mut random)?;
+    let held_out = sweeps(&world, &held, settings.beams, settings.noise, &mut random)?;
     for (sweep, pose) in readings.iter_mut().zip(&odometry) {
         sweep.pose = *pose;
     }
@@ -156,16 +163,19 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
             ..OdometrySigma::default()
         }),
         square_deg: settings.square_deg,
+        fit: settings.fit.clone(),
         ..SurveyOptions::default()
     };
     let start_s = cpu_s();
-    let found = survey(&world, &readings, &options, &NoObserver)?;
+    let found = survey(&assumed, &readings, &options, &NoObserver)?;
     let seconds = cpu_s() - start_s;
     let truth: Vec<Ends> = world.scene.walls.iter().map(|wall| [wall.a, wall.b]).collect();
     let cylinders = world.scene.cylinders.iter();
     let true_posts: Vec<PostShape> =
         cylinders.map(|of| PostShape { center: of.center, radius_m: of.radius_m }).collect();
-    let true_score = score_plan(&world, &readings, &options, (&truth, &true_posts), &poses)?;
+    // Plans are scored with the same sensor.
+    let scorer = if settings.fit.is_empty() { &assumed } else { &world };
+    let true_score = score_plan(scorer, &readings, &options, (&truth, &true_posts), &poses)?;
     let found_poses = nearest_poses(&found, &poses);
     let motion = RigidMotion::between(&found_poses, &poses);
     let walls = walls(&found, &motion);
@@ -225,6 +235,7 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
         heading_deg,
         held: explained(&world, scene, &held_out, in_frame)?,
         true_held: explained(&world, Scene::clone(&world.scene), &held_out, |sweep| sweep.pose)?,
+        fitted: settings.truth.deviations(&found),
         lead_nats: found.score - true_score,
         wrong_observed_m: wrong,
         intervals,
@@ -235,6 +246,11 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
         scenes: found.scored_scenes,
         seconds,
     })
+}
+
+/// Prints how far the fitted numbers of all rooms are off.
+fn print_fitted(trials: &[Trial]) {
+    print_deviations(trials.iter().flat_map(|trial| &trial.fitted));
 }
 
 /// Number of true posts, of those that an observed one is near, and of other observed ones.
@@ -393,7 +409,9 @@ impl Settings {
             odometry: [0.05, 5.0],
             odometry_is_used: true,
             square_deg: None,
-            noise: ReadingNoise { sigma_db: 0.5, offset_db: 0.0, sigma_m: 0.001 },
+            noise: ReadingNoise { sigma_db: 0.5, sigma_m: 0.001 },
+            truth: TrueSensor::default(),
+            fit: Vec::new(),
             is_verbose: false,
             prints_walls: false,
         };
@@ -433,7 +451,15 @@ impl Settings {
                     let (m, deg) = value.split_once(',').ok_or("--odometry: use M,DEG")?;
                     settings.odometry = [m.parse()?, deg.parse()?];
                 }
-                "--threshold-db" => settings.noise.offset_db = value.parse()?,
+                "--threshold-db" => settings.truth.threshold_db = value.parse()?,
+                "--reflectance" => settings.truth.reflectance = value.parse()?,
+                "--temperature-c" => settings.truth.temperature_c = value.parse()?,
+                "--ahead-m" => settings.truth.ahead_m = value.parse()?,
+                "--left-m" => settings.truth.left_m = value.parse()?,
+                "--fit" => {
+                    let groups = value.split(',').map(|name| serde_json::from_value(name.into()));
+                    settings.fit = groups.collect::<Result<_, _>>()?;
+                }
                 "--sigma-m" => settings.noise.sigma_m = value.parse()?,
                 _ => return Err(format!("{name} is no option").into()),
             }

@@ -13,8 +13,6 @@ use crate::rooms::normal;
 pub(crate) struct ReadingNoise {
     /// Standard deviation of the threshold from firing to firing, decibels.
     pub(crate) sigma_db: f64,
-    /// Threshold of the ranger relative to the assumed one, decibels.
-    pub(crate) offset_db: f64,
     /// Standard deviation of ranges, metres; one in fifty has a far tail.
     pub(crate) sigma_m: f64,
 }
@@ -34,7 +32,7 @@ pub(crate) fn sweeps(
         .iter()
         .map(|step| {
             let mut world = world.clone();
-            world.sensor.threshold *= 10_f64.powf((noise.offset_db + step * noise.sigma_db) / 20.0);
+            world.sensor.threshold *= 10_f64.powf(step * noise.sigma_db / 20.0);
             world.simulator(&Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 })
         })
         .collect();

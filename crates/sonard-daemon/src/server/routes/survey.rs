@@ -139,6 +139,7 @@ fn options(request: &SurveyRequest) -> SurveyOptions {
         odometry: (!request.no_odometry).then(|| request.odometry.unwrap_or_default()),
         square_deg: request.square.then_some(SurveyOptions::SQUARE_DEG),
         reflectance: request.reflectance,
+        fit: request.fit.clone(),
         max_scenes: request.max_scenes,
         ..SurveyOptions::default()
     }
@@ -226,7 +227,7 @@ fn invalid(error: &str, help: &str, field: String) -> ApiError {
 
 fn survey_error(error: &SurveyError) -> ApiError {
     let (status, help) = match error {
-        SurveyError::Option { .. } => {
+        SurveyError::Option { .. } | SurveyError::Group(_) | SurveyError::NotFittable { .. } => {
             (StatusCode::UNPROCESSABLE_ENTITY, "see `sonard survey --help`")
         }
         SurveyError::TooFewSweeps(_) => (StatusCode::UNPROCESSABLE_ENTITY, "send further sweeps"),
