@@ -88,8 +88,13 @@ fn second_signal_forces_the_end() {
     assert_closed(folder.path());
 }
 
-/// Spawns a command as the leader of a session with a terminal of its own, and returns the terminal's other end.
-fn with_terminal(mut command: std::process::Command) -> (std::process::Child, Pty) {
+/// Spawns a command as the leader of a session with a terminal of its own, and returns the terminal's other end. The program
+/// ends with the terminal, although the tests may run under `nohup`.
+fn with_terminal(wrapped: &std::process::Command) -> (std::process::Child, Pty) {
+    let mut command = std::process::Command::new("env");
+    command.arg("--default-signal=HUP").arg(wrapped.get_program()).args(wrapped.get_args());
+    let changed = wrapped.get_envs().filter_map(|(name, value)| Some((name, value?)));
+    command.envs(changed);
     let terminal = Pty::open(None).expect("a terminal");
     let name = terminal.path().to_owned();
     let side: OwnedFd =
@@ -119,7 +124,7 @@ fn closed_terminal_stops_daemon() {
     let mut command =
         sonard(&["run", "--mock", "--scene", "simple-room", "--pose", "fig9", "--log"]);
     command.arg(folder.path().join("log")).arg("--socket").arg(folder.path().join("s")).args(FAST);
-    let (child, terminal) = with_terminal(command);
+    let (child, terminal) = with_terminal(&command);
     let mut daemon = Daemon::from_child(child, folder.path());
     wait_until("beams", || daemon.status()["scan"]["done"].as_u64() >= Some(2));
     drop(terminal);
@@ -144,12 +149,13 @@ fn closed_terminal_stops_scan() {
     let mock = MockProcess::start(folder.path(), &["--realtime"]);
     let mut command = sonard(&["scan", "--port", mock.port(), "--scene", "simple-room"]);
     command.args(["--pose", "fig9", "--max-range", "3", "--out"]).arg(folder.path().join("out"));
-    let (mut child, terminal) = with_terminal(command);
+    let (mut child, terminal) = with_terminal(&command);
     let path = folder.path().join("out/scan.jsonl");
     wait_until("beams", || {
         fs::read_to_string(&path).is_ok_and(|text| text.matches("\"ping\"").count() > 3)
     });
     drop(terminal);
+    wait_until("the end of the scan", || child.try_wait().expect("it is ours").is_some());
     assert_eq!(child.wait().expect("it ends").code(), Some(1));
     let log = Log::read(&path);
     assert_eq!(log.of_type("scan_end").count(), 1);

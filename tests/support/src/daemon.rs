@@ -171,7 +171,12 @@ impl Daemon {
 
     /// Waits for the end of the process and of its messages; returns its code.
     pub fn wait(&mut self) -> Option<i32> {
-        let code = self.child.wait().expect("it ends").code();
+        let mut code = None;
+        wait_until("the end of the daemon", || {
+            code = self.child.try_wait().expect("it is ours");
+            code.is_some()
+        });
+        let code = code.and_then(|code| code.code());
         self.reader.take().into_iter().for_each(|reader| reader.join().expect("no panic"));
         code
     }
