@@ -55,6 +55,7 @@ mod symmetry;
 #[cfg(test)]
 mod tests;
 mod trace;
+pub mod trial;
 mod workspace;
 
 pub use course::{CourseMap, map_course};

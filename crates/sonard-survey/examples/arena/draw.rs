@@ -3,8 +3,7 @@
 use std::fmt::Write;
 
 use sonard_model::geometry::DVec2;
-
-use crate::measure::Ends;
+use sonard_survey::trial::Ends;
 
 /// Plan found by a run, in the frame of the arena.
 pub(crate) struct DrawnPlan<'a> {

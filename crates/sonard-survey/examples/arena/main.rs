@@ -7,9 +7,6 @@
 //! The folder has `arena.json` and `arena-sweeps.json`.
 
 mod draw;
-#[path = "../evaluate/measure.rs"]
-#[expect(dead_code, reason = "what the evaluation of random rooms uses besides")]
-mod measure;
 mod predict;
 mod runs;
 
@@ -24,10 +21,10 @@ use sonard_model::{
 };
 use sonard_survey::{
     NoObserver, OdometrySigma, PieceStatus, Survey, SurveyOptions, score_refined_plan, survey,
+    trial::{Ends, RigidMotion, coverage},
 };
 
 use draw::{DrawnPlan, draw_plans};
-use measure::{Ends, RigidMotion, coverage};
 use predict::{EchoCount, Predictor};
 use runs::{Arena, Run};
 

@@ -1,9 +1,10 @@
 //! Intervals of a survey compared with the truth.
 
 use sonard_model::geometry::{DVec2, Pose, distance_to_segment, wrap_180};
-use sonard_survey::{PieceStatus, PostShape, Survey};
-
-use crate::measure::{Ends, is_post_at};
+use sonard_survey::{
+    PieceStatus, PostShape, Survey,
+    trial::{Ends, is_post_at},
+};
 
 /// Quantities with intervals.
 const QUANTITIES: [&str; 9] = [

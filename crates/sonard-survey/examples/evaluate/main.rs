@@ -6,9 +6,7 @@
 
 mod intervals;
 mod measure;
-mod rooms;
 mod sensor;
-mod simulate;
 
 use std::{error::Error, sync::Arc};
 
@@ -22,15 +20,15 @@ use sonard_model::{
 use sonard_survey::{
     NoObserver, OdometrySigma, PieceStatus, PostShape, SearchEnd, Survey, SurveyOptions,
     score_plan, survey,
+    trial::{
+        Comparison, Ends, ReadingNoise, RigidMotion, RoomKind, add_posts, coverage, draw_course,
+        draw_place, draw_room, drift, generator, simulate_sweeps,
+    },
 };
 
 use intervals::{Intervals, count_intervals, print_intervals};
-use measure::{
-    Ends, RigidMotion, corner_errors_m, coverage, explained, is_post_at, median, reflecting_walls,
-};
-use rooms::{RoomKind, add_posts, draw_course, draw_place, draw_room, drift, generator};
+use measure::{explained, median, reflecting_walls};
 use sensor::{Deviation, TrueSensor, print_deviations};
-use simulate::{ReadingNoise, sweeps};
 
 /// Settings of an evaluation.
 struct Settings {
@@ -144,14 +142,15 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
     let assumed = World::new(Arc::new(room), sensor, Air::default(), options);
     let world = settings.truth.applied(&assumed)?;
     let odometry = drift(&poses, settings.odometry, &mut random);
-    let mut readings = sweeps(&world, &poses, settings.beams, settings.noise, &mut random)?;
+    let mut readings =
+        simulate_sweeps(&world, &poses, settings.beams, settings.noise, &mut random)?;
     let held: Vec<Pose> = (0..HELD_PLACES)
         .map(|at| {
             let place = draw_place(&world.scene, &mut random);
             Pose { x_m: place.x, y_m: place.y, heading_deg: 45.0 * at as f64 }
         })
         .collect();
-    let held_out = sweeps(&world, &held, settings.beams, settings.noise, &mut random)?;
+    let held_out = simulate_sweeps(&world, &held, settings.beams, settings.noise, &mut random)?;
     for (sweep, pose) in readings.iter_mut().zip(&odometry) {
         sweep.pose = *pose;
     }
@@ -176,10 +175,8 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
     // Plans are scored with the same sensor.
     let scorer = if settings.fit.is_empty() { &assumed } else { &world };
     let true_score = score_plan(scorer, &readings, &options, (&truth, &true_posts), &poses)?;
-    let found_poses = nearest_poses(&found, &poses);
-    let motion = RigidMotion::between(&found_poses, &poses);
-    let walls = walls(&found, &motion);
-    let [position_m, heading_deg] = motion.pose_errors(&found_poses, &poses);
+    let compared = Comparison::new(&found, &world.scene, &poses);
+    let Comparison { motion, walls, recall, precision, corners_m, .. } = compared;
     let observed = observed(&found, &motion);
     let wrong: f64 = observed
         .iter()
@@ -225,14 +222,14 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
     let is_listed = others.iter().any(|(is_true, _)| *is_true);
     Ok(Trial {
         seed,
-        recall: coverage(&truth, &walls, 0.02, 2.0),
+        recall,
         outer_recall: coverage(&outer, &walls, 0.02, 2.0),
         faces: [inner.len(), inner.iter().filter(is_found).count()],
-        posts: count_posts(&found, &motion, &true_posts),
-        precision: coverage(&walls, &truth, 0.02, 2.0),
-        corners_m: corner_errors_m(&truth, &walls),
-        position_m,
-        heading_deg,
+        posts: compared.posts,
+        precision,
+        corners_m,
+        position_m: compared.position_m,
+        heading_deg: compared.heading_deg,
         held: explained(&world, scene, &held_out, in_frame)?,
         true_held: explained(&world, Scene::clone(&world.scene), &held_out, |sweep| sweep.pose)?,
         fitted: settings.truth.deviations(&found),
@@ -251,15 +248,6 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
 /// Prints how far the fitted numbers of all rooms are off.
 fn print_fitted(trials: &[Trial]) {
     print_deviations(trials.iter().flat_map(|trial| &trial.fitted));
-}
-
-/// Number of true posts, of those that an observed one is near, and of other observed ones.
-fn count_posts(found: &Survey, motion: &RigidMotion, truth: &[PostShape]) -> [usize; 3] {
-    let observed = found.posts.iter().filter(|post| post.status == PieceStatus::Observed);
-    let centers: Vec<DVec2> = observed.map(|post| motion.of(post.center_m.into())).collect();
-    let is_found = |post: &&PostShape| centers.iter().any(|at| is_post_at(*at, post));
-    let is_wrong = |at: &&DVec2| !truth.iter().any(|post| is_post_at(**at, post));
-    [truth.len(), truth.iter().filter(is_found).count(), centers.iter().filter(is_wrong).count()]
 }
 
 /// Posts with their status, in the true frame, and the true posts.
@@ -284,24 +272,6 @@ fn print_posts(found: &Survey, motion: &RigidMotion, truth: &[PostShape]) {
     }
 }
 
-/// Poses found, of those that the survey lists as equivalent the ones nearest to the truth.
-fn nearest_poses(found: &Survey, truth: &[Pose]) -> Vec<Pose> {
-    /// Maximum number of combinations.
-    const MAX_LISTED: usize = 4096;
-    let mut all: Vec<Vec<Pose>> = vec![Vec::new()];
-    for of in &found.poses {
-        let choices = || [of.pose].into_iter().chain(of.equivalent.iter().copied());
-        let is_full = all.len() * choices().count() > MAX_LISTED;
-        let with = |known: &Vec<Pose>, next: Pose| [&known[..], &[next]].concat();
-        let count = if is_full { 1 } else { usize::MAX };
-        let longer =
-            all.iter().flat_map(|known| choices().take(count).map(|next| with(known, next)));
-        all = longer.collect();
-    }
-    let off_m = |poses: &Vec<Pose>| RigidMotion::between(poses, truth).pose_errors(poses, truth)[0];
-    all.into_iter().min_by(|a, b| off_m(a).total_cmp(&off_m(b))).unwrap_or_default()
-}
-
 /// CPU time of all threads so far, seconds (Linux).
 fn cpu_s() -> f64 {
     const TICKS_PER_S: f64 = 100.0;
@@ -309,12 +279,6 @@ fn cpu_s() -> f64 {
     let after_name = text.rsplit(')').next().unwrap_or_default();
     let ticks = after_name.split_whitespace().skip(11).take(2).flat_map(str::parse::<f64>);
     ticks.sum::<f64>() / TICKS_PER_S
-}
-
-/// Walls without conjectured stretches, in the true frame.
-fn walls(found: &Survey, motion: &RigidMotion) -> Vec<Ends> {
-    let stretches = found.walls.iter().flat_map(|wall| wall.stretches(false));
-    stretches.map(|ends| ends.map(|end| motion.of(DVec2::from(end)))).collect()
 }
 
 /// Observed pieces in the true frame.

@@ -1,101 +1,14 @@
-//! Comparison of a survey with the true room.
+//! Measures of a survey that need the model.
 
 use std::{collections::BTreeSet, sync::Arc};
 
 use sonard_inverse::{FitSweep, World, WorldError};
 use sonard_model::{
-    geometry::{DVec2, Pose, distance_to_segment, wrap_180},
+    geometry::Pose,
     model::{Reflector, TooCostly},
     reading::PingStatus,
     scene::Scene,
 };
-use sonard_survey::PostShape;
-
-/// Wall as a pair of ends, metres.
-pub(crate) type Ends = [DVec2; 2];
-
-/// Rigid motion from the frame of a survey to the true one.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct RigidMotion {
-    turn: DVec2,
-    by: DVec2,
-}
-
-impl RigidMotion {
-    /// Motion that lays places on the true ones (least squares).
-    pub(crate) fn between(found: &[Pose], truth: &[Pose]) -> Self {
-        let mean = |poses: &[Pose]| {
-            poses.iter().map(Pose::position).sum::<DVec2>() / poses.len().max(1) as f64
-        };
-        let (from, to) = (mean(found), mean(truth));
-        let (mut cosine, mut sine) = (0.0, 0.0);
-        for (a, b) in found.iter().zip(truth) {
-            let (a, b) = (a.position() - from, b.position() - to);
-            cosine += a.dot(b);
-            sine += a.perp_dot(b);
-        }
-        let turn = DVec2::new(cosine, sine).normalize_or(DVec2::X);
-        Self { turn, by: to - turn.rotate(from) }
-    }
-
-    pub(crate) fn of(&self, point: DVec2) -> DVec2 {
-        self.turn.rotate(point) + self.by
-    }
-
-    pub(crate) fn inverse_of(&self, pose: &Pose) -> Pose {
-        let back = DVec2::new(self.turn.x, -self.turn.y);
-        let at = back.rotate(pose.position() - self.by);
-        let heading_deg = pose.heading_deg - self.turn.to_angle().to_degrees();
-        Pose { x_m: at.x, y_m: at.y, heading_deg }
-    }
-
-    /// Mean errors of positions, metres, and headings, degrees.
-    pub(crate) fn pose_errors(&self, found: &[Pose], truth: &[Pose]) -> [f64; 2] {
-        let turn_deg = self.turn.to_angle().to_degrees();
-        let (mut off_m, mut off_deg) = (0.0, 0.0);
-        for (a, b) in found.iter().zip(truth) {
-            off_m += self.of(a.position()).distance(b.position());
-            off_deg += wrap_180(a.heading_deg + turn_deg - b.heading_deg).abs();
-        }
-        let count = found.len().max(1) as f64;
-        [off_m / count, off_deg / count]
-    }
-}
-
-/// Share of the length of walls that is within a distance, metres, and an angle, degrees, of
-/// others.
-pub(crate) fn coverage(walls: &[Ends], others: &[Ends], off_m: f64, off_deg: f64) -> f64 {
-    const STEP_M: f64 = 0.01;
-    let (mut length_m, mut covered_m) = (0.0, 0.0);
-    for [a, b] in walls {
-        let own_m = a.distance(*b);
-        let count = (own_m / STEP_M).ceil().max(2.0);
-        let is_parallel = |[c, d]: &&Ends| {
-            let sine = (b - a).normalize_or_zero().perp_dot((d - c).normalize_or_zero());
-            sine.abs() < off_deg.to_radians().sin()
-        };
-        let near: Vec<&Ends> = others.iter().filter(is_parallel).collect();
-        let is_covered = |at: &usize| {
-            let point = a.lerp(*b, (*at as f64 + 0.5) / count);
-            near.iter().any(|[c, d]| distance_to_segment(point, *c, *d) < off_m)
-        };
-        let covered = (0..count as usize).filter(is_covered).count();
-        length_m += own_m;
-        covered_m += own_m * covered as f64 / count;
-    }
-    if length_m > 0.0 { covered_m / length_m } else { 0.0 }
-}
-
-/// Distances of true corners to the nearest end of a wall, metres.
-pub(crate) fn corner_errors_m(truth: &[Ends], walls: &[Ends]) -> Vec<f64> {
-    let mut corners: Vec<DVec2> = truth.iter().flatten().copied().collect();
-    corners.dedup_by(|a, b| a.distance(*b) < 1e-6);
-    let nearest = |corner: DVec2| {
-        let ends = walls.iter().flatten().map(|end| end.distance(corner));
-        ends.fold(f64::INFINITY, f64::min)
-    };
-    corners.into_iter().map(nearest).collect()
-}
 
 /// Walls that reflect the predicted echoes of sweeps from given poses.
 pub(crate) fn reflecting_walls(
@@ -161,9 +74,4 @@ pub(crate) fn explained(
 pub(crate) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
-}
-
-/// Returns `true` if a place is within 2 cm of the axis of a post.
-pub(crate) fn is_post_at(at: DVec2, post: &PostShape) -> bool {
-    at.distance(post.center) < 0.02
 }

@@ -1,33 +1,36 @@
-//! Sweeps with the noise of a real receiver.
+//! Simulated sweeps with the noise of a real receiver.
 
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StudentT};
-use sonard_inverse::{FiringOutcome, FitSweep, SweepFiring, World};
+use sonard_inverse::{FiringOutcome, FitSweep, SweepFiring, World, WorldError};
 use sonard_model::{geometry::Pose, model::Simulator, reading::PingStatus};
 use uuid::Uuid;
 
-use crate::rooms::normal;
+use super::rooms::normal;
 
 /// Noise of readings.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct ReadingNoise {
+pub struct ReadingNoise {
     /// Standard deviation of the threshold from firing to firing, decibels.
-    pub(crate) sigma_db: f64,
+    pub sigma_db: f64,
     /// Standard deviation of ranges, metres; one in fifty has a far tail.
-    pub(crate) sigma_m: f64,
+    pub sigma_m: f64,
 }
 
 /// Thresholds at which sweeps are predicted, in standard deviations.
 const STEPS: [f64; 5] = [-1.8, -0.9, 0.0, 0.9, 1.8];
 
 /// Simulates sweeps of `beams` beams from each pose.
-pub(crate) fn sweeps(
+///
+/// # Errors
+/// Invalid sensor, or more paths than can be found.
+pub fn simulate_sweeps(
     world: &World,
     poses: &[Pose],
     beams: usize,
     noise: ReadingNoise,
     random: &mut impl Rng,
-) -> Result<Vec<FitSweep>, sonard_inverse::WorldError> {
+) -> Result<Vec<FitSweep>, WorldError> {
     let simulators: Result<Vec<Simulator>, _> = STEPS
         .iter()
         .map(|step| {

@@ -1,4 +1,4 @@
-//! Random rooms by kind, and courses through them.
+//! Random rooms by kind, courses through them, and their odometry.
 
 use std::{fmt, str::FromStr};
 
@@ -12,7 +12,7 @@ use sonard_model::{
 
 /// Kind of a random room.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum RoomKind {
+pub enum RoomKind {
     /// Rectangle.
     Rectangle,
     /// Rectangle with one slanted wall.
@@ -28,10 +28,13 @@ pub(crate) enum RoomKind {
 }
 
 impl RoomKind {
-    pub(crate) const ALL: [Self; 6] =
+    /// All kinds.
+    pub const ALL: [Self; 6] =
         [Self::Rectangle, Self::Oblique, Self::Cut, Self::L, Self::Box, Self::Posts];
 
-    const fn name(self) -> &'static str {
+    /// Name of the kind, as parsed.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Rectangle => "rectangle",
             Self::Oblique => "oblique",
@@ -59,13 +62,18 @@ impl FromStr for RoomKind {
     }
 }
 
-/// Generator of a trial: independent of all others.
-pub(crate) fn generator(kind: RoomKind, seed: u64) -> Pcg64 {
-    Pcg64::seed_from_u64(1000 * seed + kind as u64)
+/// Random number generator of a trial: independent of those of all other kinds and seeds.
+#[must_use]
+pub fn generator(kind: RoomKind, seed: u64) -> Pcg64 {
+    Pcg64::seed_from_u64(seed.wrapping_mul(1000).wrapping_add(kind as u64))
 }
 
-/// Draws a room of 2.2 to 4.2 m, turned by any angle up to a right one.
-pub(crate) fn draw_room(kind: RoomKind, random: &mut impl Rng) -> Result<Scene, SceneError> {
+/// Draws a room of 2.2 to 4.2 m, turned by any angle up to a right one. A room with posts has none
+/// before [`add_posts`].
+///
+/// # Errors
+/// None: corners and materials are valid.
+pub fn draw_room(kind: RoomKind, random: &mut impl Rng) -> Result<Scene, SceneError> {
     let (mut w, mut d) = (random.random_range(2.4..4.0), random.random_range(2.2..3.4));
     let mut inside = Vec::new();
     let outline = match kind {
@@ -120,7 +128,7 @@ fn is_free(scene: &Scene, at: DVec2) -> bool {
 
 /// Adds one to three posts with a radius of 2 to 12 cm, at least 0.3 m from walls, stops and each
 /// other.
-pub(crate) fn add_posts(scene: &mut Scene, stops: &[Pose], random: &mut impl Rng) {
+pub fn add_posts(scene: &mut Scene, stops: &[Pose], random: &mut impl Rng) {
     const CLEAR_M: f64 = 0.3;
     const MAX_TRIES: usize = 5000;
     let [low, high] = extent(scene);
@@ -143,8 +151,8 @@ pub(crate) fn add_posts(scene: &mut Scene, stops: &[Pose], random: &mut impl Rng
     }
 }
 
-/// Draws a place with clearance.
-pub(crate) fn draw_place(scene: &Scene, random: &mut impl Rng) -> DVec2 {
+/// Draws a place with clearance in a room that has one.
+pub fn draw_place(scene: &Scene, random: &mut impl Rng) -> DVec2 {
     let [low, high] = extent(scene);
     loop {
         let share = DVec2::new(random.random(), random.random());
@@ -156,7 +164,7 @@ pub(crate) fn draw_place(scene: &Scene, random: &mut impl Rng) -> DVec2 {
 }
 
 /// Draws a course of stops, 0.4 to 0.8 m from each to the next, straight and with clearance.
-pub(crate) fn draw_course(scene: &Scene, stops: usize, random: &mut impl Rng) -> Vec<Pose> {
+pub fn draw_course(scene: &Scene, stops: usize, random: &mut impl Rng) -> Vec<Pose> {
     const MAX_TRIES: usize = 5000;
     let mut places = vec![draw_place(scene, random)];
     let mut heading_deg: f64 = random.random_range(0.0..360.0);
@@ -184,9 +192,9 @@ pub(crate) fn draw_course(scene: &Scene, stops: usize, random: &mut impl Rng) ->
     (0..places.len()).map(pose).collect()
 }
 
-/// Odometry of a course whose moves have errors: standard deviations of the position per metre and
-/// of the heading in degrees per metre.
-pub(crate) fn drift(poses: &[Pose], per_m: [f64; 2], random: &mut impl Rng) -> Vec<Pose> {
+/// Odometry of a course whose moves have errors: standard deviations of the position, metres per
+/// metre, and of the heading, degrees per metre.
+pub fn drift(poses: &[Pose], per_m: [f64; 2], random: &mut impl Rng) -> Vec<Pose> {
     let Some(first) = poses.first() else { return Vec::new() };
     let mut odometry = vec![*first];
     for pair in poses.windows(2) {
@@ -208,6 +216,6 @@ pub(crate) fn drift(poses: &[Pose], per_m: [f64; 2], random: &mut impl Rng) -> V
 }
 
 /// Standard normal deviate.
-pub(crate) fn normal(random: &mut impl Rng) -> f64 {
+pub(super) fn normal(random: &mut impl Rng) -> f64 {
     Normal::new(0.0, 1.0).map_or(0.0, |normal| normal.sample(random))
 }
