@@ -91,7 +91,7 @@ check_text() {
   cargo fmt --all -- --check
   cargo fmt --manifest-path fuzz/Cargo.toml -- --check
   cargo fmt --manifest-path python/Cargo.toml -- --check
-  cargo fmt --manifest-path web/wasm/Cargo.toml -- --check
+  cargo fmt --manifest-path web/wasm/Cargo.toml --all -- --check
   step "clippy, warnings denied"
   cargo clippy "${selection[@]}" --all-targets --quiet -- -D warnings
 }
@@ -177,7 +177,7 @@ smoke_playground() {
   if command -v rustup >/dev/null; then
     rustup --quiet target add wasm32-unknown-unknown || fail "no wasm32-unknown-unknown: PLAYGROUND=0 leaves the playground out"
   fi
-  (cd web/wasm && CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$root/target}/wasm gently cargo check --locked --quiet)
+  (cd web/wasm && CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$root/target}/wasm gently cargo check --workspace --locked --quiet)
 }
 
 develop_python() {

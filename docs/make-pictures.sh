@@ -88,6 +88,7 @@ cp target/page/page-{overlays,preview}.png "$pictures/"
 # The playground, likewise.
 web/build.sh
 cargo test --quiet -p sonard-browser-tests playground::pictures
+cargo test --quiet -p sonard-browser-tests playground::hidden_room
 for picture in desk phone engines; do cp "target/page/playground-$picture.png" "$pictures/"; done
-cp target/page/playground.png "$pictures/playground.png"
+cp target/page/playground.png target/page/hidden-room.png "$pictures/"
 ls -l "$pictures"

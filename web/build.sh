@@ -8,8 +8,9 @@ cd "$(dirname "$0")/.."
 target=$PWD/${CARGO_TARGET_DIR:-target}
 case ${CARGO_TARGET_DIR:-} in /*) target=$CARGO_TARGET_DIR ;; esac
 page=$target/playground
-# Limit of the compressed size of all files, bytes.
+# Limits of the compressed sizes, bytes: of the playground, and of what the page "Hidden room" loads in addition.
 max_bytes=1000000
+max_survey_bytes=1000000
 
 if command -v rustup >/dev/null; then
   rustup --quiet target add wasm32-unknown-unknown || {
@@ -23,25 +24,25 @@ tools=$target/tools/web/node_modules/.bin
 module() { (cd web/wasm && CARGO_TARGET_DIR=$target/wasm cargo "$1" --release --locked --quiet "${@:2}"); }
 if [ "${CHECK:-1}" != 0 ]; then
   "$tools/tsc" --project web/jsconfig.json
-  module clippy -- -D warnings
+  module clippy --workspace -- -D warnings
 fi
-module build
-wasm=$target/wasm/wasm32-unknown-unknown/release/sonard_playground.wasm
+# One after the other, so that neither module has features of dependencies that only the other needs.
+module build -p sonard-playground
+module build -p sonard-playground-survey
+wasm=$target/wasm/wasm32-unknown-unknown/release
 
 rm -rf "$page"
 mkdir -p "$page"
 bundle() { "$tools/esbuild" "$1" --bundle --minify --format=iife --charset=utf8 --log-level=warning --outfile="$2"; }
 bundle web/playground/main.js "$page/playground.js"
+bundle web/playground/hidden-room.js "$page/hidden-room.js"
 bundle web/playground/worker.js "$target/playground-worker.js"
+bundle web/playground/survey-worker.js "$target/survey-worker.js"
 # A page opened from disk can neither fetch a module nor start a worker from a file, so a script contains both.
-node web/pack.mjs "$wasm" "$target/playground-worker.js" "$tools/.." >"$page/model-data.js"
-cp web/playground/{index.html,playground.css} crates/sonard-daemon/src/server/page/{style.css,icon.svg} "$page"
+pack() { node web/pack.mjs "$1" "$wasm/$2" "$target/$3" "$tools/.." "${@:4}"; }
+pack SONARD_MODEL sonard_playground.wasm playground-worker.js >"$page/model-data.js"
+pack SONARD_SURVEY sonard_playground_survey.wasm survey-worker.js page.is_survey_over page.report_progress >"$page/survey-data.js"
+cp web/playground/{index.html,hidden-room.html,playground.css} crates/sonard-daemon/src/server/page/{style.css,icon.svg} "$page"
 
-bytes=0
-for file in "$page"/*; do
-  size=$(gzip -9 -c "$file" | wc -c)
-  bytes=$((bytes + size))
-  printf '%8d  %s\n' "$size" "$(basename "$file")"
-done
-printf '%8d  total, compressed, bytes\n' "$bytes"
-[ "$bytes" -lt "$max_bytes" ] || { echo "web/build.sh: the total exceeds $max_bytes bytes" >&2; exit 1; }
+web/check-size.sh $max_bytes "$page"/{index.html,playground.js,model-data.js,playground.css,style.css,icon.svg}
+web/check-size.sh $max_survey_bytes "$page"/{hidden-room.html,hidden-room.js,survey-data.js}

@@ -41,12 +41,29 @@ export class ModelError extends Error {
   }
 }
 
+/** Problem of a failed request; a broken module must be loaded again. @param {any} error */
+export function problemOf(error) {
+  if (error instanceof ModelError) return error.problem;
+  return { message: `Model failure: ${error.message}`, help: "reload the page", broken: true };
+}
+
 export class Engine {
-  /** @param {BufferSource} bytes */
-  static async load(bytes) {
-    // The module imports nothing, so it can reach neither page nor network.
-    const { instance } = await WebAssembly.instantiate(bytes, {});
-    return new Engine(/** @type {any} */ (instance.exports));
+  /**
+   * Loads a module, which can reach neither page nor network: it imports nothing, or the observer of a survey alone.
+   * @param {BufferSource} bytes
+   * @param {{onProgress: (progress: any) => void, isOver: () => boolean}} [observer]
+   */
+  static async load(bytes, observer) {
+    /** @type {any} */
+    let exports;
+    const report_progress = (/** @type {number} */ address, /** @type {number} */ length) => {
+      const text = new TextDecoder().decode(new Uint8Array(exports.memory.buffer, address, length));
+      observer.onProgress(JSON.parse(text));
+    };
+    const is_survey_over = () => Number(observer.isOver());
+    const { instance } = await WebAssembly.instantiate(bytes, observer ? { page: { report_progress, is_survey_over } } : {});
+    exports = instance.exports;
+    return new Engine(exports);
   }
 
   /**

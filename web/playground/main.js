@@ -19,8 +19,8 @@ import { Logs } from "./logs.js";
 import { Model } from "./model.js";
 import { Pulse } from "./pulse.js";
 import { newRoom } from "./room.js";
-import { decompress, showLink, stateFromLink } from "./share.js";
-import { defaultState, planOf, settingsOf } from "./state.js";
+import { moduleBytes, pack, showLink, stateFromLink } from "./share.js";
+import { defaultState, parseState, planOf, settingsOf } from "./state.js";
 import { setLamp, showProblem, summaryOf } from "./status-text.js";
 import { Tour } from "./tour.js";
 import { poseWithinWalls } from "./walls.js";
@@ -29,8 +29,6 @@ import { poseWithinWalls } from "./walls.js";
 
 /** @param {string} id */
 const byId = (id) => /** @type {any} */ (document.getElementById(id));
-/** Maximum decompressed size of the module, bytes. */
-const MAX_BYTES = 16 << 20;
 /** Delay of the summary, so that screen readers do not read every frame of a drag. */
 const SUMMARY_DELAY_MS = 400;
 /** Maximum number of stored sweep times. */
@@ -419,6 +417,10 @@ function addListeners() {
   placeTrace();
   byId("save").addEventListener("click", () => files.save({ ...state.scene, poses: { ...state.scene.poses, here: state.pose } }));
   byId("share").addEventListener("click", () => showLink(state));
+  byId("hide-room").addEventListener("click", async () => {
+    // The room becomes the hidden one of the other page, where a course begins at the ranger.
+    location.href = `hidden-room.html#${await pack({ scene: state.scene, start: state.pose })}`;
+  });
   addEventListener("hashchange", () => openLink());
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
     palette = colours();
@@ -431,7 +433,7 @@ function addListeners() {
 /** Opens the view in the page's address; resolves to `false` if it has none. */
 async function openLink() {
   if (location.hash.length < 2) return false;
-  const shared = await stateFromLink(location.hash.slice(1));
+  const shared = await stateFromLink(location.hash.slice(1), parseState);
   if (!shared) return false;
   openRoom(shared.scene, shared);
   tour.pause("Shared view", "Drag or turn the ranger, or change the settings.");
@@ -440,9 +442,7 @@ async function openLink() {
 
 async function start() {
   const { wasm, worker } = /** @type {any} */ (globalThis).SONARD_MODEL;
-  const compressed = Uint8Array.from(atob(wasm), (letter) => letter.charCodeAt(0));
-  const bytes = await decompress(compressed, "gzip", MAX_BYTES);
-  model = new Model(bytes.buffer, worker, handleMessage);
+  model = new Model(await moduleBytes(wasm), worker, handleMessage);
   const presets = await model.request({ kind: "list_presets" });
   for (const { name, text } of presets.scenes) rooms.set(name, JSON.parse(text));
   for (const sensor of presets.sensors) sensors.set(sensor.name, sensor);
@@ -452,7 +452,6 @@ async function start() {
   if (await openLink()) return;
   tour.goTo(0);
   if (location.hash.length > 1) setText(byId("tour-text"), "This link is incomplete.");
-
 }
 
 /** Interface for tests and the browser's console. */

@@ -1,9 +1,9 @@
 // A view as a link: compressed into the fragment, which browsers do not send to servers.
 
-import { parseState } from "./state.js";
-
 /** Maximum decompressed size of a link, bytes. */
 const MAX_BYTES = 4 << 20;
+/** Maximum decompressed size of a module, bytes. */
+const MAX_MODULE_BYTES = 16 << 20;
 
 /** Shows the link to a view in a dialog. @param {object} view */
 export async function showLink(view) {
@@ -23,7 +23,7 @@ export async function showLink(view) {
 }
 
 /** @param {object} view */
-async function pack(view) {
+export async function pack(view) {
   const text = new Blob([JSON.stringify(view)]).stream();
   const bytes = await readAll(text.pipeThrough(new CompressionStream("deflate-raw")), MAX_BYTES);
   const letters = Array.from(bytes, (byte) => String.fromCharCode(byte)).join("");
@@ -37,12 +37,18 @@ async function unpack(packed) {
   return JSON.parse(new TextDecoder().decode(await decompress(compressed, "deflate-raw", MAX_BYTES)));
 }
 
+/** Bytes of a WebAssembly module that a script contains, compressed, as base64. @param {string} packed */
+export async function moduleBytes(packed) {
+  const compressed = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
+  return (await decompress(compressed, "gzip", MAX_MODULE_BYTES)).buffer;
+}
+
 /**
  * @param {Uint8Array<ArrayBuffer>} bytes
  * @param {CompressionFormat} format
  * @param {number} max_bytes
  */
-export function decompress(bytes, format, max_bytes) {
+function decompress(bytes, format, max_bytes) {
   return readAll(new Blob([bytes]).stream().pipeThrough(new DecompressionStream(format)), max_bytes);
 }
 
@@ -64,10 +70,15 @@ async function readAll(stream, max_bytes) {
   return new Uint8Array(await new Blob(pieces).arrayBuffer());
 }
 
-/** Returns the view in a link, or `null` if the link is invalid. @param {string} packed */
-export async function stateFromLink(packed) {
+/**
+ * Returns the view in a link, or `null` if the link is invalid.
+ * @template T
+ * @param {string} packed
+ * @param {(value: any) => T | null} parse
+ */
+export async function stateFromLink(packed, parse) {
   try {
-    return parseState(await unpack(packed));
+    return parse(await unpack(packed));
   } catch {
     return null;
   }

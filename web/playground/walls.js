@@ -1,4 +1,4 @@
-// Stops a moved ranger at walls and pillars.
+// Stops a moved ranger or robot at walls and pillars.
 
 /** @import { FloorPlan, Pose } from "./engine.js" */
 /** @typedef {[number, number]} Point */
@@ -31,6 +31,25 @@ export function poseWithinWalls(plan, from, to) {
     goal = [at[0] - rest * normal[1], at[1] + rest * normal[0]];
   }
   return { ...to, x_m: at[0], y_m: at[1] };
+}
+
+/**
+ * Share of a straight drive from one pose to another that keeps a distance from all obstacles, 0 to 1.
+ * @param {FloorPlan} plan
+ * @param {Pose} from
+ * @param {Pose} to
+ * @param {number} clearance_m
+ */
+export function freeShare(plan, from, to, clearance_m) {
+  const [at, by] = /** @type {[Point, Point]} */ ([[from.x_m, from.y_m], [to.x_m - from.x_m, to.y_m - from.y_m]]);
+  const length_m = Math.hypot(...by);
+  if (length_m === 0) return 1;
+  // An obstacle shortly behind the goal is too near, too.
+  const scale = 1 + clearance_m / length_m;
+  const hit = firstObstacle(plan, at, [at[0] + scale * by[0], at[1] + scale * by[1]]);
+  if (!hit) return 1;
+  const across = Math.abs(by[0] * hit.normal[0] + by[1] * hit.normal[1]);
+  return Math.min(1, Math.max(0, scale * hit.share - clearance_m / (across || length_m)));
 }
 
 /**

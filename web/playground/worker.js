@@ -1,6 +1,6 @@
 // Worker that runs the model: computes the latest requested view in slices, so that a newer view can replace it.
 
-import { Engine, ModelError } from "./engine.js";
+import { Engine, ModelError, problemOf } from "./engine.js";
 
 /** Target duration of a slice. */
 const SLICE_MS = 20;
@@ -115,10 +115,4 @@ function isCurrent(view) {
     channel.port1.onmessage = () => done(requested === view);
     channel.port2.postMessage(null);
   });
-}
-
-/** @param {any} error */
-function problemOf(error) {
-  if (error instanceof ModelError) return error.problem;
-  return { message: `Model failure: ${error.message}`, help: "reload the page", broken: true };
 }

@@ -5,10 +5,11 @@ mod animated;
 mod driven;
 mod equal;
 mod fast;
+mod hidden_room;
 mod pictures;
 mod served;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -21,17 +22,22 @@ fn open(screen: Screen) -> Browser {
 
 /// Opens the page with a fragment in its address.
 fn open_with(screen: Screen, fragment: &str) -> Browser {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("playground");
-    let page = folder.join("index.html");
-    assert!(
-        page.exists(),
-        "{}: build it with web/build.sh, or skip it with `PLAYGROUND=0 ./test.sh` or \
-         `cargo test -p sonard-browser-tests -- --skip playground::`",
-        page.display()
-    );
+    let page = folder().join("index.html");
     let browser = Browser::open_at(&format!("file://{}{fragment}", page.display()), screen);
     wait_until_idle(&browser);
     browser
+}
+
+/// Folder of the pages.
+fn folder() -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("playground");
+    assert!(
+        folder.join("index.html").exists(),
+        "{}: build it with web/build.sh, or skip it with `PLAYGROUND=0 ./test.sh` or \
+         `cargo test -p sonard-browser-tests -- --skip playground::`",
+        folder.display()
+    );
+    folder
 }
 
 /// Waits until the requested view is shown.

@@ -6,6 +6,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use sonard_model::{acoustics::Sensor, model::EngineKind, scene::shipped};
 use sonard_records::{FloorPlan, ScanView};
+use sonard_wasm_module::{Dispatcher, encode, half_beam_deg};
 
 use crate::{
     Request, RequestError,
@@ -17,21 +18,15 @@ use crate::{
 
 /// Request handler with its state: settings, running sweeps, and the scans of the last log.
 #[derive(Default)]
-pub struct Dispatcher {
+pub struct ModelDispatcher {
     setup: Option<Setup>,
     /// Running sweeps by engine name.
     sweeps: BTreeMap<&'static str, Sweep>,
     log: Vec<ScanView>,
 }
 
-impl Dispatcher {
-    /// Handles a request; both request and response are JSON.
-    pub fn handle(&mut self, request: &[u8]) -> String {
-        let response = serde_json::from_slice(request)
-            .map_err(|error| RequestError::new(&format!("invalid request: {error}"), ""))
-            .and_then(|request| self.dispatch(request));
-        response.unwrap_or_else(|error| json!({ "error": error }).to_string())
-    }
+impl Dispatcher for ModelDispatcher {
+    type Request = Request;
 
     fn dispatch(&mut self, request: Request) -> Result<String, RequestError> {
         match request {
@@ -41,10 +36,8 @@ impl Dispatcher {
                 let setup = self.setup.insert(Setup::new(&settings, previous)?);
                 self.sweeps.clear();
                 let simulator = setup.simulator(EngineKind::Paths)?;
-                // Two-way half-amplitude width: the one-way gain is the square root of one half.
-                let half_beam_deg = simulator.beam().angle_at(0.5_f64.sqrt()).to_degrees();
                 let plan = FloorPlan::from_scene(&setup.scene);
-                encode(&json!({ "plan": plan, "half_beam_deg": half_beam_deg }))
+                encode(&json!({ "plan": plan, "half_beam_deg": half_beam_deg(&simulator) }))
             }
             Request::StartSweep { engine, pose, plan, measured } => {
                 let setup = self.setup.as_mut().ok_or_else(not_configured)?;
@@ -79,7 +72,9 @@ impl Dispatcher {
             }
         }
     }
+}
 
+impl ModelDispatcher {
     fn sweep(&mut self, engine: EngineKind) -> Result<&mut Sweep, RequestError> {
         let sweep = self.sweeps.get_mut(engine.name());
         sweep.ok_or_else(|| {
@@ -98,10 +93,6 @@ struct Readings<'a, T> {
 
 fn not_configured() -> RequestError {
     RequestError::new("the model is not configured", "send `configure` first")
-}
-
-fn encode(response: &impl Serialize) -> Result<String, RequestError> {
-    serde_json::to_string(response).map_err(|error| RequestError::new(&error, ""))
 }
 
 /// Built-in scenes as text, and sensor presets.

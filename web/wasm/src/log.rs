@@ -4,7 +4,7 @@ use std::io::{self, Cursor, Read};
 
 use jiff::Timestamp;
 use serde::Serialize;
-use sonard_import::{Assumptions, ImportSource, Mapping};
+use sonard_import::{Assumptions, ImportError, ImportSource, Mapping};
 use sonard_model::{
     acoustics::{Air, Sensor},
     geometry::Pose,
@@ -111,12 +111,18 @@ fn import_table(text: &str, pose: Pose) -> Result<Vec<Record>, RequestError> {
     };
     let open =
         || -> io::Result<Box<dyn Read>> { Ok(Box::new(Cursor::new(text.as_bytes().to_vec()))) };
-    let found = ImportSource { open: &open }.examine(Mapping::default(), taken)?;
+    let found = ImportSource { open: &open }
+        .examine(Mapping::default(), taken)
+        .map_err(|error| import_error(&error))?;
     let mut session = Session::new(Timestamp::UNIX_EPOCH, Provenance::Imported, sensor, &air);
     session.array.clone_from(&found.assumptions.array);
     let mut records = vec![Record::Session(Box::new(session))];
-    for scan in found.scans(open()?)? {
-        records.extend(scan?);
+    for scan in found.scans(open()?).map_err(|error| import_error(&error))? {
+        records.extend(scan.map_err(|error| import_error(&error))?);
     }
     Ok(records)
+}
+
+fn import_error(error: &ImportError) -> RequestError {
+    RequestError::new(error, error.help())
 }

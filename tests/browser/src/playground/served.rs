@@ -17,6 +17,10 @@ fn served_with_its_policy() {
     wait_until_idle(&browser);
     assert_eq!(eval_json(&browser, "location.pathname"), "/playground/");
     assert_eq!(eval_json(&browser, "playground.scan().beams.size"), 400);
+    browser.click("a[href='hidden-room.html']");
+    browser.until("globalThis.hiddenRoom?.idle() === true");
+    browser.click("a[href='index.html']");
+    wait_until_idle(&browser);
     // The policy blocks requests to the daemon.
     let result = eval_json(&browser, "fetch('/v1/status').then(() => 'sent', () => 'blocked')");
     assert_eq!(result, "blocked");

@@ -30,6 +30,8 @@ const PENS = {
   conjectured: { label: "surveyed wall or post: conjectured", colour: "--good", width: 2, dash: [1.5, 3] },
   surveyed: { label: "surveyed pose", colour: "--good", width: 1.5, symbol: "pose" },
   region: { label: "95 % region of the pose, enlarged", colour: "--good", width: 1, symbol: "ring" },
+  truth: { label: "true wall or post", colour: "--border", width: 9 },
+  odometry: { label: "pose by odometry", colour: "--muted", width: 1.5, symbol: "pose" },
   located: { label: "located pose", colour: "--bad", width: 2, dash: [2, 3] },
   lobe: { label: "main lobe up to the reading", colour: "--muted", width: 1, symbol: "lobe" },
   preview: { label: "preview of the next scan", colour: "--good", width: 1.3, symbol: "square" },

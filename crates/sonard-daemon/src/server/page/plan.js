@@ -165,7 +165,7 @@ export class Plan {
   }
 
   fit() {
-    const room = this.corners();
+    const room = this.extent();
     for (const { center: [x, y], radius_m: r } of this.scene?.cylinders ?? []) room.push([x - r, y - r], [x + r, y + r]);
     const pose = this.scan?.start.pose;
     if (pose) room.push([pose.x_m, pose.y_m]);
@@ -178,6 +178,11 @@ export class Plan {
     this.fitted = key;
     if (room.length === 1) room.push(...[[-1, -1], [1, 1]].map(([x, y]) => [room[0][0] + x, room[0][1] + y]));
     this.view.fit(room, ends, grow);
+  }
+
+  /** Points of the room that the view is fitted to, metres. */
+  extent() {
+    return this.corners();
   }
 
   /** End points of the scene's walls, metres. */

@@ -84,6 +84,7 @@ static ASSETS: &[Asset] = &assets![
     "strip.js" SCRIPT,
     "summary.js" SCRIPT,
     "survey.js" SCRIPT,
+    "surveyed-plan.js" SCRIPT,
     "svg.js" SCRIPT,
     "table.js" SCRIPT,
     "timeline.js" SCRIPT,

@@ -27,11 +27,14 @@ const POLICY: HeaderValue = HeaderValue::from_static(
 /// Maximum size of a file, bytes.
 const MAX_BYTES: u64 = 16 << 20;
 
-/// All served files of the folder; the first is the page itself.
-const FILES: [(&str, &str); 6] = [
+/// All served files of the folder; the first is the playground's page.
+const FILES: [(&str, &str); 9] = [
     ("index.html", HTML),
     ("playground.js", SCRIPT),
     ("model-data.js", SCRIPT),
+    ("hidden-room.html", HTML),
+    ("hidden-room.js", SCRIPT),
+    ("survey-data.js", SCRIPT),
     ("playground.css", CSS),
     ("style.css", CSS),
     ("icon.svg", SVG),
@@ -54,6 +57,7 @@ pub(super) fn endpoints() -> Vec<Route> {
                 json!({"type": "string"}),
                 "File name, as referenced by the page",
             )
+            .responds_text(200, HTML, about)
             .responds_text(200, SCRIPT, about)
             .responds_text(200, CSS, about)
             .responds_text(200, SVG, about),
@@ -69,7 +73,7 @@ async fn file(
     PathParams(name): PathParams<String>,
 ) -> Result<Response, ApiError> {
     // Only known names are accepted, so none leads out of the folder.
-    let known = FILES.into_iter().skip(1).find(|(known, _)| *known == name);
+    let known = FILES.into_iter().find(|(known, _)| *known == name);
     let missing = || {
         let help = "the page is at GET /playground/";
         ApiError::new(StatusCode::NOT_FOUND, "unknown file of the playground", help)

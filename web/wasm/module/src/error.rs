@@ -1,7 +1,6 @@
 //! Errors of requests.
 
 use serde::Serialize;
-use sonard_import::ImportError;
 use sonard_model::{
     acoustics::{AirError, SensorError},
     model::{ModelError, TooCostly},
@@ -22,7 +21,8 @@ pub struct RequestError {
 }
 
 impl RequestError {
-    pub(crate) fn new(message: &(impl ToString + ?Sized), help: impl Into<String>) -> Self {
+    /// Creates an error with its advice.
+    pub fn new(message: &(impl ToString + ?Sized), help: impl Into<String>) -> Self {
         Self { message: message.to_string(), help: help.into(), line: None }
     }
 }
@@ -35,12 +35,6 @@ impl From<SceneError> for RequestError {
 
 impl From<PoseError> for RequestError {
     fn from(error: PoseError) -> Self {
-        Self::new(&error, error.help())
-    }
-}
-
-impl From<ImportError> for RequestError {
-    fn from(error: ImportError) -> Self {
         Self::new(&error, error.help())
     }
 }
