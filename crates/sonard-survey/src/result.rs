@@ -9,7 +9,8 @@ use sonard_model::{
 };
 use uuid::Uuid;
 
-use crate::room::MATERIAL;
+/// Material of all walls and posts.
+pub(crate) const MATERIAL: &str = "wall";
 
 /// Floor plan and poses that explain the readings of sweeps, with what they leave undetermined.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -9,7 +9,7 @@ use sonard_model::{
     scene::{Material, Scene},
 };
 
-use crate::error::SurveyError;
+use crate::{error::SurveyError, result::MATERIAL};
 
 /// World without walls. Its maximum range is the shortest of `max_range_m` and those of options and
 /// sensor; longer ranges count as no echo.
@@ -31,9 +31,6 @@ pub fn unknown_room(
     let max_range_m = Some(max_range_m.min(measured_m));
     Ok(World::new(scene, sensor, air, Options { max_range_m, ..options }))
 }
-
-/// Material of all walls and posts.
-pub(crate) const MATERIAL: &str = "wall";
 
 /// World of an empty scene with the material of the walls, the transducer on the axis: ranges are
 /// from there.

@@ -12,8 +12,8 @@ use crate::{
     error::SurveyError,
     normal::NormalEquations,
     options::SurveyOptions,
-    result::{FittedNumber, SensorFit},
-    room::MATERIAL,
+    result::{FittedNumber, MATERIAL, SensorFit},
+    room::empty_scene_of,
 };
 
 /// Groups of numbers that a survey can fit. Poses, walls and posts are always estimated; a common
@@ -112,7 +112,7 @@ impl SensorFitter {
         if let Some(group) = options.fit.iter().find(|group| !GROUPS.contains(group)) {
             return Err(SurveyError::NotFittable { group: *group, fittable: GROUPS.to_vec() });
         }
-        let initial = crate::room::empty_scene_of(world, options.reflectance);
+        let initial = empty_scene_of(world, options.reflectance);
         let priors = priors(&options.fit, &[], &initial, 0)?;
         let total = DVector::zeros(priors.len());
         Ok(Self { initial, priors, total, covariance: None })
