@@ -67,6 +67,8 @@ const INTERRUPT_INTERVAL: Duration = Duration::from_millis(50);
 ///     Numbers of sensor and air to fit together with the plan: ``"threshold"``, ``"rise"`` (of the
 ///     threshold with range), ``"mounting"``, ``"materials"`` (the reflectance), ``"air"`` (speed
 ///     of sound), ``"delay"``, ``"gear"``, ``"beam"``, ``"skirts"``, ``"pulse"``.
+/// view_reach_m : float
+///     Maximum distance of the next view from a stop, metres, 0 to 20.
 /// max_scenes : int
 ///     Budget of the search: maximum number of floor plans whose readings are predicted.
 /// closed : bool
@@ -90,9 +92,9 @@ const INTERRUPT_INTERVAL: Duration = Duration::from_millis(50);
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "they are keywords where they are used")]
 #[pyo3(signature = (sweeps, poses = None, *, azimuths_deg = None, sensor = None, air = None,
-    odometry = Some((0.05, 5.0)), square = false, max_range_m = 5.0, reflectance = 0.97, fit = Vec::new(), max_scenes = 30_000,
+    odometry = Some((0.05, 5.0)), square = false, max_range_m = 5.0, reflectance = 0.97, fit = Vec::new(), view_reach_m = 1.5, max_scenes = 30_000,
     closed = false, progress = None),
-    text_signature = "(sweeps, poses=None, *, azimuths_deg=None, sensor=None, air=None, odometry=(0.05, 5.0), square=False, max_range_m=5.0, reflectance=0.97, fit=(), max_scenes=30000, closed=False, progress=None)")]
+    text_signature = "(sweeps, poses=None, *, azimuths_deg=None, sensor=None, air=None, odometry=(0.05, 5.0), square=False, max_range_m=5.0, reflectance=0.97, fit=(), view_reach_m=1.5, max_scenes=30000, closed=False, progress=None)")]
 pub(crate) fn survey<'py>(
     py: Python<'py>,
     sweeps: &Bound<'py, PyAny>,
@@ -105,6 +107,7 @@ pub(crate) fn survey<'py>(
     max_range_m: f64,
     reflectance: f64,
     fit: Vec<String>,
+    view_reach_m: f64,
     max_scenes: i64,
     closed: bool,
     progress: Option<Py<PyAny>>,
@@ -123,6 +126,7 @@ pub(crate) fn survey<'py>(
         square_deg: square.then_some(SurveyOptions::SQUARE_DEG),
         reflectance,
         fit,
+        view_reach_m,
         max_scenes,
         ..SurveyOptions::default()
     };

@@ -66,6 +66,25 @@ def test_finds_a_post() -> None:
     np.testing.assert_allclose(found.scene.cylinders, [[*post.center, post.radius_m]], atol=1e-5)
 
 
+def test_next_view() -> None:
+    corners = np.array([[0.0, 0.0], [3.4, 0.0], [3.4, 1.5], [1.6, 1.5], [1.6, 2.9], [0.0, 2.9]])
+    room = sonard.Scene.from_points(corners)
+    stops = np.array([[2.6, 0.4, 20.0], [3.0, 0.8, 20.0]])
+    found = sonard.survey(sonard.Model(room, max_range_m=4.0).predict(stops), stops, max_range_m=4.0)
+    view = found.next_view
+    assert view is not None and 0.1 < view.gain_nats <= found.open_nats
+    assert view.pose.shape == (3,) and np.hypot(*(view.pose[:2] - stops[:, :2]).T).min() <= 1.5
+    assert room.clearance_m(view.pose[:2]) > 0.2
+    shares = [part.share for part in view.resolves]
+    assert shares == sorted(shares, reverse=True) and 0 < sum(shares) <= 1 + 1e-9
+    for part in view.resolves:
+        assert part.ends.shape[1:] == (2, 2) and 0 < part.probability < 1
+        assert (part.kind in ("wall", "post")) == (part.name is not None)
+    # Places are limited to the reach.
+    near = sonard.survey(sonard.Model(room, max_range_m=4.0).predict(stops), stops, max_range_m=4.0, view_reach_m=0.0)
+    assert near.next_view is None and near.open_nats == found.open_nats
+
+
 def test_matches_command(command: Command, tmp_path: Path) -> None:
     room = tmp_path / "truth.json"
     room.write_text(ROOM.to_json())
@@ -84,6 +103,7 @@ def test_matches_command(command: Command, tmp_path: Path) -> None:
         [wall["from"]["at_m"], wall["to"]["at_m"]] for wall in listed["walls"]
     ]
     assert [list(causes) for causes in found.causes] == listed["causes"]
+    assert (found.open_nats, found.next_view) == (listed["open_nats"], listed["next_view"])
     assert found.scene == sonard.Scene.load(tmp_path / "out/scene.json")
 
 
@@ -186,6 +206,7 @@ def test_error_messages(sweeps: NDArray[np.void]) -> None:
         (ValueError, "max_range_m is NaN", (sweeps, ODOMETRY), {"max_range_m": np.nan}),
         (ValueError, "max_scenes is -1: it must be at least 1", (sweeps, ODOMETRY), {"max_scenes": -1}),
         (ValueError, "odometry[0] is 0: it must be positive and finite", (sweeps, ODOMETRY), {"odometry": (0.0, 5.0)}),
+        (ValueError, "view_reach_m is 30: it must be from 0 to 20", (sweeps, ODOMETRY), {"view_reach_m": 30}),
         (ValueError, "reflectance is 1.5: it must be above 0, up to 1", (sweeps, ODOMETRY), {"reflectance": 1.5}),
     ]
     for kind, words, arguments, options in cases:

@@ -2,6 +2,7 @@
 
 mod checkpoint;
 mod files;
+mod next_view;
 mod picture;
 mod summary;
 
@@ -69,6 +70,10 @@ pub(super) struct Args {
     /// rise, mounting, materials (the reflectance), air, delay, gear, beam, skirts, pulse
     #[arg(long, value_name = "WHAT", value_delimiter = ',', hide_possible_values = true)]
     fit: Vec<ParameterGroup>,
+    /// Maximum distance of the next view from a stop, metres
+    #[arg(long, value_name = "M", default_value_t = SurveyOptions::default().view_reach_m,
+          value_parser = within(0.0..=20.0))]
+    view_reach: f64,
     /// Budget of the search: maximum number of floor plans whose readings are predicted
     #[arg(long, value_name = "N", default_value_t = SurveyOptions::default().max_scenes,
           value_parser = parse_count)]
@@ -92,8 +97,9 @@ missing echoes, minimum ranges. No scene is needed; one in the log is ignored.
 
 Each stretch of wall is observed (explained echoes of two sweeps or more determine it there), implied \
 (plans without it explain less) or conjectured (left out of scene.json without --closed). Floor \
-plans that explain the readings nearly as well are listed with their probabilities. The frame is \
-the pose of the first sweep in the log. Dimensions follow the speed of sound: 0.17 % per degree.
+plans that explain the readings nearly as well are listed with their probabilities, and the next \
+view is the place from which one more sweep is expected to decide most of it. The frame is the \
+pose of the first sweep in the log. Dimensions follow the speed of sound: 0.17 % per degree.
 
 An interrupted survey, or one whose budget is spent, writes the best plan so far. The same command \
 continues from unfinished.jsonl, also after the program was killed; --max-scenes may differ.
@@ -161,6 +167,7 @@ impl Args {
             square_deg: self.square.then_some(SurveyOptions::SQUARE_DEG),
             reflectance: self.reflectance,
             fit: self.fit.clone(),
+            view_reach_m: self.view_reach,
             max_scenes: self.max_scenes,
             ..SurveyOptions::default()
         }

@@ -99,6 +99,9 @@ fn survey_reconstructs_room_and_course() {
     }
     assert_eq!(read("poses.csv").lines().count(), 1 + STOPS.len());
     assert!(read("report.md").contains("![Floor plan](plan.png)"));
+    // Nothing is open in a closed room.
+    assert!(printed.contains("next view: none"), "{printed}");
+    assert!(survey["next_view"].is_null() && !read("plan.svg").contains("next view"), "{survey}");
     assert!(read("plan.svg").contains("observed wall"));
 
     // Without odometry, the room looks alike from two poses half a turn apart.
@@ -130,6 +133,35 @@ fn survey_reconstructs_room_and_course() {
 
     // Results are kept without --force.
     assert_eq!(run(&arguments).status.code(), Some(2));
+}
+
+/// From two stops in an arm of an L the other arm is open.
+#[test]
+fn survey_proposes_the_next_view() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let room = serde_json::json!({
+        "name": "room", "materials": {"wall": {"reflectance": 0.97}},
+        "walls": [{"id": "wall", "closed": true, "material": "wall",
+            "polyline": [[0, 0], [3.4, 0], [3.4, 1.5], [1.6, 1.5], [1.6, 2.9], [0, 2.9]]}],
+    });
+    let [scene, a, b, out] =
+        ["truth.json", "a.jsonl", "b.jsonl", "out"].map(|name| path(folder.path(), name));
+    fs::write(&scene, room.to_string()).expect("written");
+    for (log, pose) in [(&a, "2.6,0.4,20"), (&b, "3,0.8,20")] {
+        let simulate = ["simulate", "--scene", &scene, "--pose", pose, "-o", log];
+        succeeds(&[&simulate[..], &["--max-range", "4"]].concat());
+    }
+    let printed = succeeds(&["survey", &a, &b, "--max-range", "4", "--out", &out]);
+    assert!(printed.contains("next view: a full turn at ("), "{printed}");
+    let read = |name: &str| fs::read_to_string(format!("{out}/{name}")).expect(name);
+    assert!(read("report.md").contains("## Next view"), "{}", read("report.md"));
+    assert!(read("plan.svg").contains("next view"));
+    let survey: Value = serde_json::from_str(&read("survey.json")).expect("JSON");
+    let view = &survey["next_view"];
+    let [gain, open] =
+        [&view["gain_nats"], &survey["open_nats"]].map(|of| of.as_f64().expect("nats"));
+    assert!(gain > 0.1 && gain <= open, "{survey}");
+    assert!(view["resolves"].as_array().is_some_and(|parts| !parts.is_empty()), "{view}");
 }
 
 #[test]

@@ -53,6 +53,8 @@ pub struct SurveyView<'a> {
     pub poses: &'a [Pose],
     /// Echoes at their range and azimuth, metres.
     pub echoes: &'a [(DVec2, EchoCause)],
+    /// Place from which a further sweep resolves most of what is open, metres.
+    pub next_view: Option<DVec2>,
 }
 
 const WALLS: [(WallCertainty, &str, &str, f64, &str); 3] = [
@@ -71,6 +73,9 @@ const AROUND_M: f64 = 0.4;
 /// Radius at which the interval of a corner is legible, px.
 const LEGIBLE_PX: f64 = 6.0;
 const COURSE_PX: f64 = 1.4;
+/// Mark of the next view.
+const NEXT_VIEW: MarkShape = MarkShape::Triangle;
+const NEXT_VIEW_PX: f64 = 8.0;
 
 /// Draws the walls over the echoes that they explain. Echoes of several reflections appear behind
 /// the walls. Intervals of corners are enlarged by a power of ten, which the legend states.
@@ -94,6 +99,7 @@ pub fn draw_survey(view: &SurveyView) -> Picture {
     inside.add(walls(view, &plan));
     inside.add(corners(view, &plan, factor));
     inside.add(course(view, &plan));
+    inside.add(next_view(view, &plan));
     page.add(inside);
     page.add(plan.scale_bar());
     Picture::new(theme::PAGE_PX, page_px, page)
@@ -102,7 +108,7 @@ pub fn draw_survey(view: &SurveyView) -> Picture {
 fn region(view: &SurveyView) -> Bounds {
     let ends = view.walls.iter().flat_map(|(_, ends)| *ends);
     let posts = view.posts.iter().map(|(_, center, _)| *center);
-    let places = view.poses.iter().map(Pose::position);
+    let places = view.poses.iter().map(Pose::position).chain(view.next_view);
     let around = Bounds::around(ends.chain(posts).chain(places).filter(|at| at.is_finite()));
     let nothing = Bounds { min: DVec2::ZERO, max: DVec2::ONE };
     around.unwrap_or(nothing).grown(AROUND_M)
@@ -140,6 +146,10 @@ fn entries(view: &SurveyView, factor: f64) -> Vec<LegendEntry> {
     }
     let line = LegendSample::Line { colour: theme::ORANGE, width_px: COURSE_PX, dash: "none" };
     entries.push(LegendEntry::new(line, "course"));
+    if view.next_view.is_some() {
+        let mark = LegendSample::Mark { shape: NEXT_VIEW, colour: theme::BLUE };
+        entries.push(LegendEntry::new(mark, "next view"));
+    }
     entries
 }
 
@@ -174,6 +184,17 @@ fn course(view: &SurveyView, plan: &PlanProjection) -> Layer {
     for pose in view.poses {
         layer.circle(plan.px(pose.position()), 4.0);
         layer.line(plan.px(pose.position()), plan.px(pose.point_at(0.0, 0.12)));
+    }
+    layer
+}
+
+fn next_view(view: &SurveyView, plan: &PlanProjection) -> Layer {
+    let mut layer = Layer::new("next-view")
+        .with("fill", theme::BLUE)
+        .with("stroke", theme::PAPER)
+        .with("stroke-width", 1.0);
+    if let Some(at) = view.next_view {
+        layer.mark(NEXT_VIEW, plan.px(at), NEXT_VIEW_PX, None);
     }
     layer
 }
@@ -215,6 +236,7 @@ mod tests {
                 corners: &corners,
                 poses: &[pose],
                 echoes: &[(DVec2::new(1.0, 3.0), EchoCause::First)],
+                next_view: (radius_m > 1e-3).then_some(DVec2::new(2.0, 2.0)),
             };
             let plan = PlanProjection::fit(region(&view), Rect::new(0.0, 0.0, 900.0, 700.0));
             let factor = enlargement(&view, &plan);
@@ -222,6 +244,7 @@ mod tests {
             assert!(drawn_px >= LEGIBLE_PX && (factor == 1.0 || drawn_px < 11.0 * LEGIBLE_PX));
             let svg = draw_survey(&view).to_svg();
             assert_eq!(svg.contains("times enlarged"), factor > 1.0, "{radius_m}");
+            assert_eq!(svg.matches("next view").count(), usize::from(radius_m > 1e-3));
             assert!(svg.contains("observed wall") && !svg.contains("conjectured wall"));
         }
     }

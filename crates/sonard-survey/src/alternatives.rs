@@ -175,7 +175,7 @@ fn split([from, to]: [f64; 2], stretches: &[[f64; 2]]) -> Vec<([f64; 2], bool)> 
 }
 
 /// Returns `true` if all points of each plan are near the other.
-fn is_same(a: &[Segment], b: &[Segment]) -> bool {
+pub(crate) fn is_same(a: &[Segment], b: &[Segment]) -> bool {
     let covers = |a: &[Segment], b: &[Segment]| a.iter().all(|wall| is_covered(wall, b));
     covers(a, b) && covers(b, a)
 }

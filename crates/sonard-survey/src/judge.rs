@@ -165,7 +165,11 @@ impl<'a> Judge<'a> {
     }
 
     /// Score, or an upper bound of it that does not exceed `floor`, nats.
-    fn score_segments_above(&self, segments: &[Segment], floor: f64) -> Result<f64, f64> {
+    pub(crate) fn score_segments_above(
+        &self,
+        segments: &[Segment],
+        floor: f64,
+    ) -> Result<f64, f64> {
         let price = price(segments) + POST_NATS * self.posts.len() as f64;
         let oblique = self.oblique_nats(segments);
         let priced = |nats: f64| nats - price - oblique;
@@ -178,9 +182,18 @@ impl<'a> Judge<'a> {
         self.workspace.square_rad.map_or(0.0, |sigma_rad| oblique_price(segments, sigma_rad))
     }
 
+    /// Log-likelihood of all readings, with the readings of an arc as one, nats.
+    pub(crate) fn log_likelihood(&self, segments: &[Segment]) -> f64 {
+        self.log_likelihood_above(segments, f64::NEG_INFINITY).unwrap_or(UNSCORED)
+    }
+
     /// Log-likelihood of all readings, with the readings of an arc as one, nats; an upper bound as
     /// soon as some sweeps give one below `floor`.
-    fn log_likelihood_above(&self, segments: &[Segment], floor: f64) -> Result<f64, f64> {
+    pub(crate) fn log_likelihood_above(
+        &self,
+        segments: &[Segment],
+        floor: f64,
+    ) -> Result<f64, f64> {
         /// Rounding of sums in different orders, nats.
         const ROUNDING: f64 = 1e-6;
         let digest = self.digest(segments);
@@ -352,7 +365,7 @@ fn sweep_nats(
 }
 
 /// Log-likelihood of a measured outcome under a predicted one, nats; largest where both are equal.
-fn outcome_nats(outcomes: [Outcome; 2], sigma_m: f64, max_range_m: f64) -> f64 {
+pub(crate) fn outcome_nats(outcomes: [Outcome; 2], sigma_m: f64, max_range_m: f64) -> f64 {
     match outcomes {
         [Outcome::Echo(range_m), Outcome::Echo(expected_m)] => {
             let density = range_density(range_m - expected_m, sigma_m);

@@ -10,6 +10,9 @@
 //! 3. Poses and lines are refined together with the paths of all explained arcs, and lines, posts
 //!    and boxes are added where arcs remain unexplained.
 //!
+//! Finally the place is found from which one more sweep resolves most of what is open, the
+//! [`NextView`].
+//!
 //! [`map_course`] does the first step alone, for courses without a scene.
 
 mod alternatives;
@@ -26,6 +29,7 @@ mod feature;
 mod judge;
 mod line;
 mod moves;
+mod next_view;
 mod normal;
 mod odometry;
 mod options;
@@ -66,8 +70,9 @@ pub use options::SurveyOptions;
 pub use post::PostShape;
 pub use progress::{NoObserver, SurveyObserver, SurveyProgress, SurveyStage};
 pub use result::{
-    AlternativePlan, FittedNumber, PieceStatus, ReadingCause, SearchEnd, SensorFit, Survey,
-    SurveyedEnd, SurveyedPose, SurveyedPost, SurveyedWall, UnexplainedArc, WallPiece,
+    AlternativePlan, FittedNumber, NextView, OpenPart, PieceStatus, ReadingCause, ResolvedPart,
+    SearchEnd, SensorFit, Survey, SurveyedEnd, SurveyedPose, SurveyedPost, SurveyedWall,
+    UnexplainedArc, WallPiece,
 };
 pub use room::unknown_room;
 pub use scores::PlanScores;

@@ -24,6 +24,8 @@ pub struct SurveyOptions {
     pub reflectance: f64,
     /// Groups of numbers of sensor and air that are fitted together with the plan.
     pub fit: Vec<ParameterGroup>,
+    /// Maximum distance of the next view from a stop, metres.
+    pub view_reach_m: f64,
     /// Maximum number of scored scenes.
     pub max_scenes: usize,
 }
@@ -38,6 +40,7 @@ impl Default for SurveyOptions {
             square_deg: None,
             reflectance: 0.97,
             fit: Vec::new(),
+            view_reach_m: 1.5,
             max_scenes: 30_000,
         }
     }
@@ -46,13 +49,17 @@ impl Default for SurveyOptions {
 impl SurveyOptions {
     /// Standard deviation of the directions of walls in a room that is mostly square, degrees.
     pub const SQUARE_DEG: f64 = 1.0;
+    /// Largest possible distance of the next view from a stop, metres.
+    const MAX_VIEW_REACH_M: f64 = 20.0;
 
     /// Checks that every value is in its range.
     ///
     /// # Errors
     /// The first value that is not.
     pub(crate) fn check(&self) -> Result<(), SurveyError> {
-        let Self { odometry, range_sigma_m, arc_deg, square_deg, reflectance, .. } = *self;
+        let Self {
+            odometry, range_sigma_m, arc_deg, square_deg, reflectance, view_reach_m, ..
+        } = *self;
         let odometry = odometry.unwrap_or_default();
         let positive = "positive and finite";
         let checks = [
@@ -71,6 +78,12 @@ impl SurveyOptions {
                 range_sigma_m.unwrap_or(1.0),
                 range_sigma_m.unwrap_or(1.0) > 0.0,
                 positive,
+            ),
+            (
+                "view_reach_m",
+                view_reach_m,
+                (0.0..=Self::MAX_VIEW_REACH_M).contains(&view_reach_m),
+                "from 0 to 20",
             ),
             ("arc_deg", arc_deg, arc_deg > 0.0, positive),
             ("square_deg", square_deg.unwrap_or(1.0), square_deg.unwrap_or(1.0) > 0.0, positive),

@@ -10,6 +10,8 @@ use crate::{
     arrangement::LineArrangement,
     covariance::PlanCovariance,
     judge::{Judge, Predictions, outcome_of},
+    next_view::find_next_view,
+    options::SurveyOptions,
     posed::PosedPlan,
     posts::evidence_nats,
     readings::{Beam, Outcome},
@@ -35,7 +37,7 @@ pub(crate) fn report(
     assessment: &Assessment,
     covariance: &Option<PlanCovariance>,
     workspace: &Workspace,
-    (end, reflectance, fitted): (SearchEnd, f64, Option<SensorFit>),
+    (end, options, fitted): (SearchEnd, &SurveyOptions, Option<SensorFit>),
 ) -> Survey {
     let judge = Judge::of(workspace, posed, workspace.errors.final_sigma_m());
     let explained_m = workspace.errors.explained_m();
@@ -58,6 +60,9 @@ pub(crate) fn report(
     let equivalent = equivalent_poses(posed, &judge);
     let (alternatives, probability) = weighted(assessment);
     let posts = surveyed_posts(posed, &judge, &predictions, covariance);
+    // The scenes of the search, without those of the next view.
+    let scored_scenes = workspace.scored();
+    let (open_nats, next_view) = find_next_view(posed, &judge, assessment, &posts, options);
     Survey {
         walls: assessment
             .walls
@@ -96,9 +101,11 @@ pub(crate) fn report(
         causes: causes.collect(),
         alternatives,
         probability,
+        open_nats,
+        next_view,
         end,
-        scored_scenes: workspace.scored(),
-        reflectance,
+        scored_scenes,
+        reflectance: options.reflectance,
         fitted,
     }
 }

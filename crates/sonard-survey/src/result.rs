@@ -37,6 +37,14 @@ pub struct Survey {
     pub alternatives: Vec<AlternativePlan>,
     /// Probability of the best plan among those listed, 0 to 1.
     pub probability: f64,
+    /// Entropy of what the readings leave open, nats: of the plan, its alternatives, and the plan
+    /// with a stretch, a post or a gap changed; 0 if no other is within 10 nats.
+    #[serde(default)]
+    pub open_nats: f64,
+    /// Pose of a further sweep that resolves most of it; `None` if nothing is open, or no reachable
+    /// place resolves anything.
+    #[serde(default)]
+    pub next_view: Option<NextView>,
     /// Reason why the search ended.
     pub end: SearchEnd,
     /// Number of different scenes scored.
@@ -212,6 +220,59 @@ pub struct AlternativePlan {
     pub score_difference: f64,
     /// Probability among the plans listed, 0 to 1.
     pub probability: f64,
+}
+
+/// Pose of a full turn that resolves most of what a survey leaves open.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NextView {
+    /// Place, reachable by a straight move from a stop, with the heading of the nearest stop.
+    pub pose: Pose,
+    /// Expected decrease of the entropy by the readings there, nats.
+    pub gain_nats: f64,
+    /// Open parts that they resolve, the largest share first.
+    pub resolves: Vec<ResolvedPart>,
+}
+
+/// Open part of a plan that a view resolves.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ResolvedPart {
+    /// Difference from the best plan.
+    #[serde(flatten)]
+    pub part: OpenPart,
+    /// Probability of the plan with that difference, 0 to 1.
+    pub probability: f64,
+    /// Share of the gain, 0 to 1.
+    pub share: f64,
+}
+
+/// Possible difference from the best plan.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case", tag = "kind")]
+pub enum OpenPart {
+    /// A stretch of wall that may be absent.
+    Wall {
+        /// Name of the wall.
+        wall: String,
+        /// First end, metres.
+        from_m: [f64; 2],
+        /// Second end, metres.
+        to_m: [f64; 2],
+    },
+    /// Walls at free ends that may be present.
+    Gap {
+        /// Pairs of ends, metres.
+        walls: Vec<[[f64; 2]; 2]>,
+    },
+    /// A post that may be absent.
+    Post {
+        /// Name of the post.
+        post: String,
+    },
+    /// Another plan.
+    Alternative {
+        /// Number among the alternatives, from 1.
+        number: usize,
+    },
 }
 
 /// Reason why a search ended.

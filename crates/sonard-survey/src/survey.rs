@@ -130,7 +130,8 @@ pub fn resume_survey(
         let assessment = search.settle();
         let end = early_end.unwrap_or_else(|| search.last_end());
         let (posed, covariance) = (&search.posed, &search.covariance);
-        let stated = (end, fitter.world()?.1, fitter.report()?);
+        let options = &SurveyOptions { reflectance: fitter.world()?.1, ..options.clone() };
+        let stated = (end, options, fitter.report()?);
         return Ok(report(sweeps, posed, &assessment, covariance, &workspace, stated));
     }
     unreachable!("the last round returns")

@@ -2,6 +2,7 @@
 
 mod boxes;
 mod coarse;
+mod next_view;
 mod posts;
 mod rectangle;
 mod sensor_fit;

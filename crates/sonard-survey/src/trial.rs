@@ -7,4 +7,6 @@ mod rooms;
 
 pub use compare::{Comparison, Ends, RigidMotion, coverage, is_post_at};
 pub use readings::{ReadingNoise, simulate_sweeps};
-pub use rooms::{RoomKind, add_posts, draw_course, draw_place, draw_room, drift, generator};
+pub use rooms::{
+    RoomKind, add_posts, draw_course, draw_place, draw_room, drift, extent, generator, is_free,
+};

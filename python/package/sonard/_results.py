@@ -387,6 +387,40 @@ class UnexplainedArc:
     """Number of beams."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ResolvedPart:
+    """Possible difference from the best plan that a view resolves."""
+
+    kind: Literal["wall", "gap", "post", "alternative"]
+    """A stretch of wall or a post that may be absent, walls at free ends that may be present, or another plan."""
+    name: str | None
+    """Name of the wall or post."""
+    ends: NDArray[np.float64]
+    """Both ends of the stretch or of each wall that may be present, x and y in metres: shape (walls, 2, 2)."""
+    alternative: int | None
+    """Index among the alternatives."""
+    probability: float
+    """Probability of the plan with that difference, 0 to 1."""
+    share: float
+    """Share of the gain of the view, 0 to 1."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class NextView:
+    """Pose of a full turn that resolves most of what a survey leaves open."""
+
+    pose: NDArray[np.float64]
+    """Place and a heading, which is irrelevant for a full turn: x and y in metres, degrees."""
+    gain_nats: float
+    """Expected decrease of ``open_nats`` by the readings there, nats."""
+    resolves: tuple[ResolvedPart, ...]
+    """Open parts that they resolve, the largest share first."""
+
+    def __repr__(self) -> str:
+        x, y, _ = self.pose
+        return f"<NextView: ({x:.3f}, {y:.3f}) m, {self.gain_nats:.3f} nats>"
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Survey:
     """Result of ``survey``."""
@@ -410,6 +444,11 @@ class Survey:
     """Other plans within 10 nats, most probable first."""
     probability: float
     """Probability of the plan among the alternatives and itself, 0 to 1."""
+    open_nats: float
+    """Entropy of what the readings leave open, nats: of the plan, its alternatives, and the plan with a stretch, a post
+    or a gap changed."""
+    next_view: NextView | None
+    """Pose of a further sweep that resolves most of it, ``None`` if nothing is open or no reachable place resolves anything."""
     score: float
     """Logarithm of the likelihood of the readings, less the price of walls and posts, nats."""
     end: Literal["complete", "unexplained_arcs", "budget", "cancelled"]
@@ -449,6 +488,8 @@ class Survey:
                 for plan in found["alternatives"]
             ),
             probability=found["probability"],
+            open_nats=found["open_nats"],
+            next_view=None if found["next_view"] is None else _next_view(found["next_view"]),
             score=found["score"],
             end=found["end"],
             arcs=found["arcs"],
@@ -476,6 +517,22 @@ def _pose_rows(poses: list[dict[str, float]]) -> NDArray[np.float64]:
 def _fitted_number(of: dict[str, Any]) -> FittedNumber:
     low, high = of["interval"]
     return FittedNumber(**(of | {"interval": (low, high), "coupled_with": tuple(of["coupled_with"])}))
+
+
+def _next_view(view: dict[str, Any]) -> NextView:
+    return NextView(_pose_rows([view["pose"]])[0], view["gain_nats"], tuple(_resolved_part(part) for part in view["resolves"]))
+
+
+def _resolved_part(part: dict[str, Any]) -> ResolvedPart:
+    walls = [[part["from_m"], part["to_m"]]] if part["kind"] == "wall" else part.get("walls", [])
+    return ResolvedPart(
+        kind=part["kind"],
+        name=part.get("wall", part.get("post")),
+        ends=np.array(walls, dtype=float).reshape(-1, 2, 2),
+        alternative=part["number"] - 1 if part["kind"] == "alternative" else None,
+        probability=part["probability"],
+        share=part["share"],
+    )
 
 
 def _surveyed_post(post: dict[str, Any]) -> SurveyedPost:

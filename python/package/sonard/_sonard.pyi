@@ -462,6 +462,7 @@ def survey(
     max_range_m: float = 5.0,
     reflectance: float = 0.97,
     fit: Sequence[str] = (),
+    view_reach_m: float = 1.5,
     max_scenes: int = 30000,
     closed: bool = False,
     progress: Callable[[dict[str, Any]], object] | None = None,

@@ -32,14 +32,15 @@ const HEAD_KEYS: Product = Product::List(&["survey_sha256", "version"]);
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Head {
-    /// SHA-256 of all inputs that determine the search. Its budget only ends it.
+    /// SHA-256 of all inputs that determine the search. Its budget only ends it, and the next view
+    /// follows it.
     survey_sha256: String,
     version: String,
 }
 
 impl Head {
     pub(super) fn new(args: &Args, input: &Input) -> Self {
-        let options = SurveyOptions { max_scenes: 0, ..args.options() };
+        let options = SurveyOptions { max_scenes: 0, view_reach_m: 0.0, ..args.options() };
         let survey_sha256 =
             digest(format_args!("{:?} {:?} {options:?}", input.world, input.sweeps));
         Self { survey_sha256, version: env!("CARGO_PKG_VERSION").to_owned() }

@@ -48,6 +48,7 @@ pub(super) fn write(args: &Args, overwrite: Overwrite, input: &Input, found: &Su
         corners: &corners,
         poses: &poses,
         echoes: &echoes(input, found),
+        next_view: found.next_view.as_ref().map(|view| view.pose.position()),
     };
     let picture = draw_survey(&view);
     let png = picture.to_png(WIDTH_PX).map_err(|error| {

@@ -5,7 +5,7 @@ use std::{
     io::{self, Write},
 };
 
-use super::Input;
+use super::{Input, next_view};
 use crate::{
     cli::table::{align_right, fit, ruled},
     scan::text::format_count,
@@ -171,7 +171,7 @@ fn pose_rows(found: &Survey) -> impl Iterator<Item = [String; 5]> + '_ {
     })
 }
 
-/// Prints walls and poses as tables, followed by remarks.
+/// Prints walls and poses as tables, followed by remarks and the next view.
 pub(super) fn print(out: &mut impl Write, input: &Input, found: &Survey) -> io::Result<()> {
     writeln!(out, "{}", in_short(input, found))?;
     let mut walls = ruled(WALL_HEAD);
@@ -202,7 +202,10 @@ pub(super) fn print(out: &mut impl Write, input: &Input, found: &Survey) -> io::
     });
     align_right(&mut poses, 0..usize::MAX);
     writeln!(out, "{}", fit(poses))?;
-    remarks(found).iter().try_for_each(|remark| writeln!(out, "{remark}"))
+    remarks(found).iter().try_for_each(|remark| writeln!(out, "{remark}"))?;
+    let (view, parts) = next_view::sentences(found);
+    writeln!(out, "next view: {view}")?;
+    parts.iter().try_for_each(|part| writeln!(out, "  {part}"))
 }
 
 /// Report with the tables of [`print`].
@@ -224,6 +227,11 @@ pub(super) fn markdown(input: &Input, found: &Survey) -> String {
         text += "\n";
     }
     text += &table(&POSE_HEAD, pose_rows(found).map(|row| row.to_vec()));
+    let (view, parts) = next_view::sentences(found);
+    let _ = writeln!(text, "\n## Next view\n\nNext view: {view}.");
+    for (part, start) in parts.iter().zip(["\n"].into_iter().chain(std::iter::repeat(""))) {
+        let _ = writeln!(text, "{start}- {part}");
+    }
     text
 }
 

@@ -57,6 +57,10 @@ pub struct SurveyRequest {
     #[serde(default)]
     #[schemars(length(max = MAX_FITTED_GROUPS))]
     pub fit: Vec<ParameterGroup>,
+    /// Maximum distance of the next view from a stop, metres.
+    #[serde(default = "default_view_reach_m")]
+    #[schemars(range(min = 0, max = 20))]
+    pub view_reach_m: f64,
     /// Maximum number of floor plans whose readings are predicted.
     #[serde(default = "default_max_scenes")]
     #[schemars(range(min = 100, max = MAX_SURVEY_SCENES))]
@@ -104,6 +108,10 @@ const fn default_max_range_m() -> f64 {
 
 fn default_reflectance() -> f64 {
     SurveyOptions::default().reflectance
+}
+
+fn default_view_reach_m() -> f64 {
+    SurveyOptions::default().view_reach_m
 }
 
 fn default_max_scenes() -> usize {

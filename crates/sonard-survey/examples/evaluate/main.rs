@@ -2,8 +2,10 @@
 //!
 //! ```sh
 //! cargo run --release -p sonard-survey --example evaluate -- --kinds rectangle,l --seeds 100:110
+//! cargo run --release -p sonard-survey --example evaluate -- --next-view --kinds l --stops 8
 //! ```
 
+mod explore;
 mod intervals;
 mod measure;
 mod sensor;
@@ -26,6 +28,7 @@ use sonard_survey::{
     },
 };
 
+use explore::compare_choices;
 use intervals::{Intervals, count_intervals, print_intervals};
 use measure::{explained, median, reflecting_walls};
 use sensor::{Deviation, TrueSensor, print_deviations};
@@ -44,6 +47,8 @@ struct Settings {
     fit: Vec<ParameterGroup>,
     is_verbose: bool,
     prints_walls: bool,
+    /// Compares choices of the next stop.
+    compares_choices: bool,
 }
 
 /// Figures of one room.
@@ -108,6 +113,9 @@ impl Trial {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let settings = Settings::from_args()?;
+    if settings.compares_choices {
+        return compare_choices(&settings);
+    }
     println!("{HEAD}");
     let mut all = Vec::new();
     for &kind in &settings.kinds {
@@ -154,17 +162,7 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
     for (sweep, pose) in readings.iter_mut().zip(&odometry) {
         sweep.pose = *pose;
     }
-    let [m_per_m, deg_per_m] = settings.odometry;
-    let options = SurveyOptions {
-        odometry: settings.odometry_is_used.then_some(OdometrySigma {
-            m_per_m,
-            deg_per_m,
-            ..OdometrySigma::default()
-        }),
-        square_deg: settings.square_deg,
-        fit: settings.fit.clone(),
-        ..SurveyOptions::default()
-    };
+    let options = settings.survey_options();
     let start_s = cpu_s();
     let found = survey(&assumed, &readings, &options, &NoObserver)?;
     let seconds = cpu_s() - start_s;
@@ -364,6 +362,17 @@ fn print_summary(kind: RoomKind, trials: &[Trial]) {
 }
 
 impl Settings {
+    fn survey_options(&self) -> SurveyOptions {
+        let [m_per_m, deg_per_m] = self.odometry;
+        let sigma = OdometrySigma { m_per_m, deg_per_m, ..OdometrySigma::default() };
+        SurveyOptions {
+            odometry: self.odometry_is_used.then_some(sigma),
+            square_deg: self.square_deg,
+            fit: self.fit.clone(),
+            ..SurveyOptions::default()
+        }
+    }
+
     fn from_args() -> Result<Self, Box<dyn Error>> {
         let mut settings = Self {
             kinds: RoomKind::ALL.to_vec(),
@@ -378,6 +387,7 @@ impl Settings {
             fit: Vec::new(),
             is_verbose: false,
             prints_walls: false,
+            compares_choices: false,
         };
         let mut args = std::env::args().skip(1);
         while let Some(name) = args.next() {
@@ -388,6 +398,10 @@ impl Settings {
                 }
                 "--walls" => {
                     settings.prints_walls = true;
+                    continue;
+                }
+                "--next-view" => {
+                    settings.compares_choices = true;
                     continue;
                 }
                 "--no-odometry" => {

@@ -114,7 +114,8 @@ pub fn draw_room(kind: RoomKind, random: &mut impl Rng) -> Result<Scene, SceneEr
 }
 
 /// Extent of the walls of a scene: lower left and upper right, metres.
-fn extent(scene: &Scene) -> [DVec2; 2] {
+#[must_use]
+pub fn extent(scene: &Scene) -> [DVec2; 2] {
     let ends = || scene.walls.iter().flat_map(|wall| [wall.a, wall.b]);
     [ends().fold(DVec2::INFINITY, DVec2::min), ends().fold(DVec2::NEG_INFINITY, DVec2::max)]
 }
@@ -122,7 +123,9 @@ fn extent(scene: &Scene) -> [DVec2; 2] {
 /// Clearance of a ranger from all walls, metres.
 const CLEAR_M: f64 = 0.25;
 
-fn is_free(scene: &Scene, at: DVec2) -> bool {
+/// Returns `true` if a ranger fits at a place.
+#[must_use]
+pub fn is_free(scene: &Scene, at: DVec2) -> bool {
     scene.clearance_m(at) > CLEAR_M && scene.are_accessible(&[at]) == [true]
 }
 

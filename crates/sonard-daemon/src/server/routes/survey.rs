@@ -140,6 +140,7 @@ fn options(request: &SurveyRequest) -> SurveyOptions {
         square_deg: request.square.then_some(SurveyOptions::SQUARE_DEG),
         reflectance: request.reflectance,
         fit: request.fit.clone(),
+        view_reach_m: request.view_reach_m,
         max_scenes: request.max_scenes,
         ..SurveyOptions::default()
     }

@@ -1,0 +1,206 @@
+//! Next best view: the place from which a full turn resolves most of what a survey leaves open.
+
+mod free_space;
+mod gaps;
+mod hypotheses;
+mod overlap;
+
+use rayon::prelude::*;
+use sonard_model::{
+    geometry::{DVec2, Pose},
+    model::Simulator,
+};
+
+use crate::{
+    alternatives::Assessment,
+    judge::{Judge, outcome_of},
+    options::SurveyOptions,
+    posed::PosedPlan,
+    readings::Outcome,
+    result::{NextView, ResolvedPart, SurveyedPost},
+};
+use free_space::FreeSpace;
+use hypotheses::{Hypothesis, hypotheses};
+use overlap::ReadingOverlap;
+
+/// Entropy of the hypotheses up to which nothing is open, nats: the plan has a probability of 98 %.
+const MIN_OPEN_NATS: f64 = 0.1;
+/// Expected decrease of that entropy below which a place resolves nothing, nats.
+const MIN_GAIN_NATS: f64 = 0.02;
+/// Share of the largest gain from which the place nearest to the last stop is preferred.
+const NEAR_BEST: f64 = 0.97;
+/// Angle between predicted beams, degrees: half of an arc.
+const STEP_DEG: f64 = 3.6;
+/// Maximum number of predicted sweeps, all places and hypotheses together.
+const MAX_SWEEPS: usize = 3000;
+/// Share of the gain from which a part is listed.
+const MIN_SHARE: f64 = 0.02;
+
+/// Entropy of the hypotheses about a plan, nats, and the view that is expected to decrease it most.
+///
+/// The hypotheses are the plan, its alternatives, and the plan with one change each: without a
+/// stretch of wall or a post that is not observed, or with a gap between free ends closed. Their
+/// probabilities are by their scores, for gaps by the likelihood. The result is independent of the number of threads; it has
+/// no view if nothing is open, no place resolves anything, or the observer cancelled.
+pub(crate) fn find_next_view(
+    posed: &PosedPlan,
+    judge: &Judge,
+    assessment: &Assessment,
+    posts: &[SurveyedPost],
+    options: &SurveyOptions,
+) -> (f64, Option<NextView>) {
+    let hypotheses = hypotheses(posed, judge, assessment, posts);
+    let weights = Weights::of(&hypotheses);
+    let open_nats = weights.entropy_nats();
+    let is_open = open_nats > MIN_OPEN_NATS;
+    let forecast = is_open.then(|| Forecast::new(judge, &hypotheses, &weights, options)).flatten();
+    let view = forecast.and_then(|forecast| best_view(&forecast, posed, judge, options));
+    (open_nats, view)
+}
+
+fn best_view(
+    forecast: &Forecast,
+    posed: &PosedPlan,
+    judge: &Judge,
+    options: &SurveyOptions,
+) -> Option<NextView> {
+    let walls = posed.plan.segments(&posed.walls);
+    let free = FreeSpace { walls: &walls, posts: &posed.posts, poses: &posed.poses, judge };
+    let places = free.places(options.view_reach_m, MAX_SWEEPS / forecast.simulators.len().max(1));
+    let is_cancelled = || judge.workspace.observer.is_cancelled();
+    let expected = |place: &DVec2| forecast.terms_at(*place).filter(|_| !is_cancelled());
+    let all: Vec<Option<Vec<f64>>> = places.par_iter().map(expected).collect();
+    if is_cancelled() {
+        return None;
+    }
+    let gain_nats = |terms: &[f64]| terms.iter().sum::<f64>();
+    let views = || {
+        let found = places.iter().zip(&all);
+        found.filter_map(|(place, terms)| Some((*place, terms.as_deref()?)))
+    };
+    let most_nats = views().map(|(_, terms)| gain_nats(terms)).fold(0.0, f64::max);
+    let last = posed.poses.last()?.position();
+    let (place, terms) = views()
+        .filter(|(_, terms)| gain_nats(terms) >= NEAR_BEST * most_nats)
+        .min_by(|a, b| a.0.distance(last).total_cmp(&b.0.distance(last)))
+        .filter(|_| most_nats > MIN_GAIN_NATS)?;
+    let nearest = |a: &&Pose, b: &&Pose| {
+        a.position().distance(place).total_cmp(&b.position().distance(place))
+    };
+    let heading_deg = posed.poses.iter().min_by(nearest)?.heading_deg;
+    Some(NextView {
+        pose: Pose { x_m: place.x, y_m: place.y, heading_deg },
+        gain_nats: gain_nats(terms),
+        resolves: forecast.resolved(terms),
+    })
+}
+
+/// Probabilities of hypotheses.
+struct Weights(Vec<f64>);
+
+impl Weights {
+    fn of(hypotheses: &[Hypothesis]) -> Self {
+        let most = hypotheses.iter().map(|of| of.nats).fold(f64::NEG_INFINITY, f64::max);
+        let weights: Vec<f64> = hypotheses.iter().map(|of| (of.nats - most).exp()).collect();
+        let sum: f64 = weights.iter().sum();
+        Self(weights.into_iter().map(|weight| weight / sum).collect())
+    }
+
+    fn entropy_nats(&self) -> f64 {
+        // Without the sign of a zero.
+        self.0.iter().filter(|p| **p > 0.0).map(|p| -p * p.ln()).sum::<f64>() + 0.0
+    }
+}
+
+/// Readings that are expected under hypotheses.
+struct Forecast<'a> {
+    hypotheses: &'a [Hypothesis],
+    weights: &'a [f64],
+    simulators: Vec<Simulator>,
+    overlap: ReadingOverlap,
+    /// Number of neighbouring predicted beams that count as one.
+    beams_per_arc: f64,
+}
+
+impl<'a> Forecast<'a> {
+    /// Forecast of given hypotheses; `None` if the scene of one is invalid.
+    fn new(
+        judge: &Judge,
+        hypotheses: &'a [Hypothesis],
+        weights: &'a Weights,
+        options: &SurveyOptions,
+    ) -> Option<Self> {
+        let simulator = |of: &Hypothesis| judge.with_posts(&of.posts).simulator_of(&of.segments);
+        Some(Self {
+            hypotheses,
+            weights: &weights.0,
+            simulators: hypotheses.iter().map(simulator).collect::<Option<_>>()?,
+            overlap: ReadingOverlap::new(judge.sigma_m, judge.workspace.reach_m()),
+            beams_per_arc: (options.arc_deg / STEP_DEG).max(1.0),
+        })
+    }
+
+    /// Terms of the expected decrease of entropy by a full turn at a place, nats, one for each
+    /// hypothesis: their sum is the gain. `None` if a scene has more paths than the model follows.
+    ///
+    /// The gain is a lower bound of the mutual information of hypothesis and readings,
+    /// `-sum_i p_i ln sum_j p_j exp(-B_ij)` with the Bhattacharyya distances `B_ij` of the readings
+    /// under two hypotheses (A. Kolchinsky and B. Tracey, "Estimating mixture entropy with pairwise
+    /// distances", Entropy 19(7), 361, 2017, with the Chernoff divergence of 1/2). It never exceeds
+    /// the entropy, and is exact where hypotheses give equal readings or exclude each other.
+    /// Readings have the likelihood of the score, those of an arc as one. The terms of the plan
+    /// itself are divided among the other hypotheses in proportion to their parts of it.
+    fn terms_at(&self, place: DVec2) -> Option<Vec<f64>> {
+        let sweeps: Vec<Vec<Outcome>> = self
+            .simulators
+            .iter()
+            .map(|simulator| predict_turn(simulator, place))
+            .collect::<Option<_>>()?;
+        let overlap = |a: usize, b: usize| {
+            let pairs = sweeps[a].iter().zip(&sweeps[b]);
+            let nats: f64 = pairs.map(|(a, b)| self.overlap.distance_nats(*a, *b)).sum();
+            (-nats / self.beams_per_arc).exp()
+        };
+        // Parts of the hypotheses in what is distinct from one of them.
+        let distinct = |of: usize| -> Vec<f64> {
+            (0..sweeps.len())
+                .map(|other| self.weights[other] * (1.0 - overlap(of, other)))
+                .collect()
+        };
+        let term =
+            |of: usize, parts: &[f64]| -self.weights[of] * (-parts.iter().sum::<f64>()).ln_1p();
+        let mut terms: Vec<f64> = (0..sweeps.len()).map(|of| term(of, &distinct(of))).collect();
+        let parts = distinct(PLAN);
+        let sum: f64 = parts.iter().sum();
+        let of_plan = std::mem::replace(&mut terms[PLAN], 0.0);
+        if sum > 0.0 {
+            terms.iter_mut().zip(parts).for_each(|(term, part)| *term += of_plan * part / sum);
+        }
+        Some(terms)
+    }
+
+    /// Parts of the plan that terms of the gain belong to, the largest first.
+    fn resolved(&self, terms: &[f64]) -> Vec<ResolvedPart> {
+        let sum: f64 = terms.iter().sum();
+        let part = |((of, probability), term): ((&Hypothesis, &f64), &f64)| {
+            let (part, share) = (of.part.clone()?, term / sum);
+            Some(ResolvedPart { part, probability: *probability, share })
+        };
+        let all = self.hypotheses.iter().zip(self.weights).zip(terms);
+        let mut found: Vec<ResolvedPart> = all.filter_map(part).collect();
+        found.retain(|of| of.share > MIN_SHARE);
+        found.sort_by(|a, b| b.share.total_cmp(&a.share));
+        found
+    }
+}
+
+/// Index of the plan itself among its hypotheses.
+const PLAN: usize = 0;
+
+/// Predicted outcomes of a full turn.
+fn predict_turn(simulator: &Simulator, place: DVec2) -> Option<Vec<Outcome>> {
+    let point = simulator.at(place);
+    let count = (360.0 / STEP_DEG) as usize;
+    let direction_rad = |at: usize| (STEP_DEG * at as f64).to_radians();
+    (0..count).map(|at| point.ping(direction_rad(at)).ok().map(|of| outcome_of(&of))).collect()
+}

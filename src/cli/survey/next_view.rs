@@ -1,0 +1,41 @@
+//! Next view of a survey as text.
+
+use crate::survey::{NextView, OpenPart, ResolvedPart, Survey};
+
+/// Place and expected gain of the next view in a sentence, and one for each part that it resolves.
+pub(super) fn sentences(found: &Survey) -> (String, Vec<String>) {
+    let open = format!("{:.2} nats", found.open_nats);
+    match &found.next_view {
+        None if found.open_nats < 0.005 => ("none: nothing is open".to_owned(), Vec::new()),
+        None => (format!("none: no reachable place resolves the {open} that are open"), Vec::new()),
+        Some(NextView { pose, gain_nats, resolves }) => {
+            let at = place([pose.x_m, pose.y_m]);
+            let text =
+                format!("a full turn at {at} resolves {gain_nats:.2} of {open} that are open");
+            (text, resolves.iter().map(part).collect())
+        }
+    }
+}
+
+fn part(of: &ResolvedPart) -> String {
+    let question = match &of.part {
+        OpenPart::Wall { wall, from_m, to_m } => {
+            format!("no {wall} from {} to {}", place(*from_m), place(*to_m))
+        }
+        OpenPart::Gap { walls } => {
+            let ends = walls.iter().map(|[a, b]| format!("{} to {}", place(*a), place(*b)));
+            format!("a wall from {}", ends.collect::<Vec<_>>().join(" and "))
+        }
+        OpenPart::Post { post } => format!("no {post}"),
+        OpenPart::Alternative { number } => format!("alternative {number}"),
+    };
+    format!(
+        "{:.0} % of it: the plan, or {question} (probability {:.2})",
+        100.0 * of.share,
+        of.probability
+    )
+}
+
+fn place([x, y]: [f64; 2]) -> String {
+    format!("({x:.2}, {y:.2})")
+}
