@@ -66,8 +66,8 @@ pub(super) struct Args {
     /// Reflectance (amplitude) of all surfaces, 0 to 1
     #[arg(long, value_name = "R", default_value_t = 0.97, value_parser = within(0.05..=1.0))]
     reflectance: f64,
-    /// Numbers of sensor and air to fit together with the plan, separated by commas: threshold,
-    /// rise, mounting, materials (the reflectance), air, delay, gear, beam, skirts, pulse
+    /// Parameters to fit, separated by commas (threshold, rise, mounting, materials, air, delay, gear,
+    /// beam, skirts, pulse)
     #[arg(long, value_name = "WHAT", value_delimiter = ',', hide_possible_values = true)]
     fit: Vec<ParameterGroup>,
     /// Maximum distance of the next view from a stop, metres

@@ -350,6 +350,7 @@ fn survey_fits_the_ranger() {
     let scene = path(Path::new(&out), "scene.json");
     succeeds(&["locate", &logs[0], "--scene", &scene, "--sensor", &sensor]);
 
+    let out = path(folder.path(), "rejected");
     let output = run(&["survey", &logs[0], &logs[1], "--fit", "walls", "--out", &out]);
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("walls can't be fitted by a survey"), "{}", stderr(&output));

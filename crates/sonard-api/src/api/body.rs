@@ -4,7 +4,7 @@ use serde::{Deserialize, Deserializer, de::Error as _};
 use serde_json::Value;
 
 /// Names of the body fields that hold lists.
-const LISTS: [&str; 5] = ["steps", "scans", "sweeps", "azimuths_deg", "ranges_m"];
+const LISTS: [&str; 6] = ["steps", "scans", "sweeps", "azimuths_deg", "ranges_m", "fit"];
 
 /// Returns `true` if a request body contains a list where the API has none.
 ///
