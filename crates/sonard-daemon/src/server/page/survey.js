@@ -1,5 +1,4 @@
-// Survey of an unknown room from the newest scans (`POST /v1/survey`): walls by status and poses with their 95 %
-// regions on the plan. The plan found can take the place of the scene, and be saved as a scene file.
+// Survey of an unknown room from the newest scans (`POST /v1/survey`), which can take the place of the scene.
 
 import { requestLines } from "./api.js";
 import { make } from "./dom.js";

@@ -1,16 +1,15 @@
-// Result of a survey on the floor plan: walls and posts by status, poses with their 95 % regions; and texts about it.
+// Result of a survey on the floor plan, and texts about it.
 
 import { count } from "./format.js";
 import { circle, drawPose, line } from "./layers.js";
 
 const RAD_PER_DEG = Math.PI / 180;
-/** Radius of the 95 % region of a normal distribution in the plane, standard deviations along the larger axis: sqrt(5.99). */
+/** Radius of a 95 % region, standard deviations along the larger axis: sqrt(5.99). */
 const REGION_SIGMAS = 2.45;
 /** Radius at which a region is legible, and maximum distance of a hovered pose, pixels. */
 const LEGIBLE_PX = 4, HOVER_PX = 8;
 const STAGES = { course: "poses", walls: "walls", alternatives: "alternatives" };
 
-/** @param {any} layer @param {any} plan @param {any} survey */
 export function drawSurvey(layer, plan, { walls, posts, poses }) {
   const { view, palette } = plan;
   for (const { pieces } of walls) {
@@ -27,7 +26,7 @@ export function drawSurvey(layer, plan, { walls, posts, poses }) {
   }
 }
 
-/** Description of the stop at a pixel, if there is one. @param {number[]} px @param {any} plan @param {any[]} poses */
+/** Description of the stop at a pixel, if there is one. */
 export function describeStop(px, { view }, poses) {
   const at = poses.findIndex(({ pose: { x_m, y_m } }) => {
     const [x, y] = view.px([x_m, y_m]);
@@ -44,7 +43,7 @@ export function progressText({ stage, round, walls, scored_scenes }) {
   return `Surveying: ${STAGES[stage]}${of}; ${count(walls, "wall")}, ${count(scored_scenes, "floor plan")} tried`;
 }
 
-/** @param {any} survey @param {string} source word for the sweeps, singular */
+/** `source` is the word for a sweep. */
 export function resultText({ walls, posts, poses, arcs, unexplained, alternatives, end }, source) {
   const early = { cancelled: "Ended early: ", budget: "The budget is spent: " }[end] ?? "";
   const others = alternatives.length ? `; ${count(alternatives.length, "other plan")} possible` : "";
@@ -59,7 +58,7 @@ function enlargement(poses, view) {
   return Math.min(1e4, Math.max(1, 10 ** Math.ceil(Math.log10(LEGIBLE_PX / middle_px))));
 }
 
-/** Draws a stretch of wall on a margin, so that its dashes are legible on a wall of the scene. */
+/** Draws a stretch of wall on a margin, legible on a wall of the scene. */
 function drawPiece(layer, { view, palette }, status, ends_m) {
   const points = ends_m.map((at) => view.px(at));
   const c = layer.pen(status, palette);
