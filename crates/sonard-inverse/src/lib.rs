@@ -50,6 +50,6 @@ pub use motion::{SceneMotion, length_derivative};
 pub use parameter::{EndOfWall, Parameter, PostPart};
 pub use parameter_groups::{GroupError, ParameterGroup, name, priors};
 pub use progress::{FitObserver, FitProgress, NoObserver};
-pub use report::{ParameterReport, calibrated_sensor};
+pub use report::{ParameterReport, calibrated_sensor, strongly_correlated};
 pub use sweep::{FiringOutcome, FitSweep, FitSweepError, SweepFiring};
 pub use world::{World, WorldError};

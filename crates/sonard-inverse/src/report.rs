@@ -148,20 +148,30 @@ impl FitResult {
     /// Correlation matrix of the estimates, in the order of the priors.
     #[must_use]
     pub fn correlations(&self) -> DMatrix<f64> {
-        let sigma = self.covariance.diagonal().map(f64::sqrt);
-        self.covariance.component_div(&(&sigma * sigma.transpose()))
+        correlations(&self.covariance)
     }
 
     /// Index pairs of strongly correlated estimates with their correlation, strongest first.
     #[must_use]
     pub fn strongly_correlated(&self) -> Vec<(usize, usize, f64)> {
-        let all = self.correlations();
-        let pairs = (0..all.nrows()).flat_map(|row| (0..row).map(move |column| (column, row)));
-        let correlated = pairs.map(|(column, row)| (column, row, all[(row, column)]));
-        let mut found: Vec<_> = correlated.filter(|(.., of)| of.abs() > MAX_CORRELATION).collect();
-        found.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
-        found
+        strongly_correlated(&self.covariance)
     }
+}
+
+fn correlations(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let sigma = covariance.diagonal().map(f64::sqrt);
+    covariance.component_div(&(&sigma * sigma.transpose()))
+}
+
+/// Index pairs of strongly correlated numbers with their correlation, strongest first.
+#[must_use]
+pub fn strongly_correlated(covariance: &DMatrix<f64>) -> Vec<(usize, usize, f64)> {
+    let all = correlations(covariance);
+    let pairs = (0..all.nrows()).flat_map(|row| (0..row).map(move |column| (column, row)));
+    let correlated = pairs.map(|(column, row)| (column, row, all[(row, column)]));
+    let mut found: Vec<_> = correlated.filter(|(.., of)| of.abs() > MAX_CORRELATION).collect();
+    found.sort_by(|a, b| b.2.abs().total_cmp(&a.2.abs()));
+    found
 }
 
 /// Sensor fitted by a command. If it differs from the initial one, it has a name of its own and a

@@ -28,7 +28,7 @@ pub enum SurveyError {
         /// Group that was requested.
         group: ParameterGroup,
         /// Groups that can be fitted.
-        fittable: Vec<ParameterGroup>,
+        fittable: &'static [ParameterGroup],
     },
     /// Invalid assumption.
     #[error("{name} is {value}: it must be {expected}")]

@@ -40,8 +40,9 @@ const MIN_SHARE: f64 = 0.02;
 ///
 /// The hypotheses are the plan, its alternatives, and the plan with one change each: without a
 /// stretch of wall or a post that is not observed, or with a gap between free ends closed. Their
-/// probabilities are by their scores, for gaps by the likelihood. The result is independent of the number of threads; it has
-/// no view if nothing is open, no place resolves anything, or the observer cancelled.
+/// probabilities are by their scores, for gaps by the likelihood. The result is independent of the
+/// number of threads; it has no view if nothing is open, no place resolves anything, or the
+/// observer cancelled.
 pub(crate) fn find_next_view(
     posed: &PosedPlan,
     judge: &Judge,
@@ -169,14 +170,12 @@ impl<'a> Forecast<'a> {
         };
         let term =
             |of: usize, parts: &[f64]| -self.weights[of] * (-parts.iter().sum::<f64>()).ln_1p();
-        let mut terms: Vec<f64> = (0..sweeps.len()).map(|of| term(of, &distinct(of))).collect();
         let parts = distinct(PLAN);
         let sum: f64 = parts.iter().sum();
-        let of_plan = std::mem::replace(&mut terms[PLAN], 0.0);
-        if sum > 0.0 {
-            terms.iter_mut().zip(parts).for_each(|(term, part)| *term += of_plan * part / sum);
-        }
-        Some(terms)
+        let of_plan = term(PLAN, &parts);
+        let share = |part: f64| if sum > 0.0 { of_plan * part / sum } else { 0.0 };
+        let own = |of: usize| if of == PLAN { 0.0 } else { term(of, &distinct(of)) };
+        Some((0..sweeps.len()).map(|of| own(of) + share(parts[of])).collect())
     }
 
     /// Parts of the plan that terms of the gain belong to, the largest first.

@@ -5,7 +5,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use nalgebra::{DMatrix, DVector};
 use sonard_inverse::{
     Parameter, ParameterEstimate, ParameterGroup, ParameterReport, Prior, World, calibrated_sensor,
-    priors,
+    priors, strongly_correlated,
 };
 
 use crate::{
@@ -18,7 +18,7 @@ use crate::{
 
 /// Groups of numbers that a survey can fit. Poses, walls and posts are always estimated; a common
 /// turn of all azimuths is a turn of the frame.
-const GROUPS: [ParameterGroup; 10] = [
+static GROUPS: [ParameterGroup; 10] = [
     ParameterGroup::Threshold,
     ParameterGroup::Rise,
     ParameterGroup::Mounting,
@@ -30,8 +30,6 @@ const GROUPS: [ParameterGroup; 10] = [
     ParameterGroup::Skirts,
     ParameterGroup::Pulse,
 ];
-/// Correlation above which two numbers are reported as coupled.
-const MAX_CORRELATION: f64 = 0.95;
 /// Change, as a share of the prior standard deviation, up to which the plan is not searched again.
 const SETTLED_SHARE: f64 = 0.02;
 
@@ -110,7 +108,7 @@ impl SensorFitter {
     /// A group that a survey can't fit, or that does not apply to the sensor.
     pub(crate) fn new(world: &World, options: &SurveyOptions) -> Result<Self, SurveyError> {
         if let Some(group) = options.fit.iter().find(|group| !GROUPS.contains(group)) {
-            return Err(SurveyError::NotFittable { group: *group, fittable: GROUPS.to_vec() });
+            return Err(SurveyError::NotFittable { group: *group, fittable: &GROUPS });
         }
         let initial = empty_scene_of(world, options.reflectance);
         let priors = priors(&options.fit, &[], &initial, 0)?;
@@ -188,11 +186,13 @@ impl SensorFitter {
                 ParameterReport::new(&self.initial, &[], prior, &estimate)
             })
             .collect();
+        let coupled = strongly_correlated(covariance);
         let coupled_with = |at: usize| {
-            let others = (0..reports.len()).filter(|other| {
-                let scale = (sigma(at) * sigma(*other)).max(f64::MIN_POSITIVE);
-                *other != at && (covariance[(at, *other)] / scale).abs() > MAX_CORRELATION
-            });
+            let is_coupled = |other: &usize| {
+                let pair = [at.min(*other), at.max(*other)];
+                coupled.iter().any(|&(column, row, _)| [column, row] == pair)
+            };
+            let others = (0..reports.len()).filter(is_coupled);
             others.map(|other| reports[other].name.clone()).collect()
         };
         let numbers = reports.iter().enumerate().map(|(at, of)| FittedNumber {

@@ -12,10 +12,9 @@ use sonard::{
     survey::{NoObserver, Survey, SurveyOptions, survey, unknown_room},
 };
 
-use super::{assert_clean, eval_json, folder, open, wait_until_idle};
+use super::{accessible::check_screens, assert_clean, eval_json, folder, open, wait_until_idle};
 use crate::live_page::{
-    accessible::{axe, nameless},
-    browser::{Browser, DESK, DESK_DARK, PHONE, PHONE_DARK, Screen},
+    browser::{Browser, DESK, Screen},
     pointer,
 };
 
@@ -357,19 +356,7 @@ fn hidden_room_is_accessible() {
     until_idle(&browser);
     browser.click("#reveal");
     until_idle(&browser);
-    for screen in [DESK, DESK_DARK, PHONE, PHONE_DARK] {
-        browser.look_through(screen);
-        browser.eval("scrollTo(0, 0)");
-        browser.until("new Promise((done) => setTimeout(() => done(true), 300))");
-        browser.picture(&format!("hidden-room-{}", screen.name));
-        let wide = browser.eval("document.documentElement.scrollWidth");
-        assert_eq!(wide, browser.eval("innerWidth"), "{}: horizontal scrolling", screen.name);
-        assert_eq!(nameless(&browser), Vec::<String>::new(), "{}", screen.name);
-        // axe-core requests the style sheets, which the policy blocks.
-        assert_clean(&browser);
-        assert_eq!(axe(&browser), Vec::<String>::new(), "{}", screen.name);
-        browser.warnings();
-    }
+    check_screens(&browser, "hidden-room", until_idle);
 }
 
 #[test]
