@@ -116,7 +116,7 @@ pub(crate) fn survey<'py>(
         let message = format!("max_scenes is {max_scenes}: it must be at least 1");
         return Err(PyValueError::new_err(message));
     };
-    let fit = fit.iter().map(|name| parse_name(py, "fit", name)).collect::<PyResult<_>>()?;
+    let fit = fit.into_iter().map(|name| parse_name(py, "fit", &name)).collect::<PyResult<_>>()?;
     let options = SurveyOptions {
         odometry: odometry.map(|(m_per_m, deg_per_m)| OdometrySigma {
             m_per_m,
