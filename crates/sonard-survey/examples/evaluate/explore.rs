@@ -153,7 +153,7 @@ fn explore(
     let mut random = generator(kind, seed);
     let mut room = draw_room(kind, &mut random)?;
     let poses = draw_course(&room, FIRST_STOPS, &mut random);
-    if kind == RoomKind::Posts {
+    if kind.has_posts() {
         add_posts(&mut room, &poses, &mut random);
     }
     let sensor = Sensor::preset("senscomp-6500")?;

@@ -57,6 +57,8 @@ struct Trial {
     recall: f64,
     /// Recall of the outer walls.
     outer_recall: f64,
+    /// Recall of the walls that reflect a reading of the true room.
+    met_recall: f64,
     /// Number of inner walls that reflect a reading of the true room, and of those found.
     faces: [usize; 2],
     /// Number of posts, of those observed within 2 cm, and of those observed elsewhere.
@@ -136,13 +138,13 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 const HEAD: &str = "| kind | rooms | complete | recall | precision | corner mm | position mm | heading deg | \
-held | true room | score within 5 | wrong observed m | outer recall | faces found | posts found | wrong posts | determined | complete of these | CPU s | scenes |";
+held | true room | score within 5 | wrong observed m | outer recall | recall of walls met | faces found | posts found | wrong posts | determined | complete of these | CPU s | scenes |";
 
 fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn Error>> {
     let mut random = generator(kind, seed);
     let mut room = draw_room(kind, &mut random)?;
     let poses = draw_course(&room, settings.stops, &mut random);
-    if kind == RoomKind::Posts {
+    if kind.has_posts() {
         add_posts(&mut room, &poses, &mut random);
     }
     let sensor = Sensor::preset("senscomp-6500")?;
@@ -190,19 +192,15 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
     // The frame of the survey is the first pose of odometry, which is the true one.
     let intervals = count_intervals(&found, &poses, &truth, &true_posts);
     let scene = found.scene("found", false).build()?;
-    let (outer, inner): (Vec<Ends>, Vec<Ends>) = {
-        let mut inner = Vec::new();
-        let reflecting = reflecting_walls(&world, &poses, settings.beams)?;
-        let numbered = world.scene.walls.iter().zip(&truth).enumerate();
-        let outer = numbered.filter(|(at, (wall, ends))| {
-            let is_inner = wall.id.starts_with("box");
-            if is_inner && reflecting.contains(at) {
-                inner.push(**ends);
-            }
-            !is_inner
-        });
-        (outer.map(|(_, (_, ends))| *ends).collect(), inner)
-    };
+    let reflecting = reflecting_walls(&world, &poses, settings.beams)?;
+    let (mut outer, mut inner, mut met) = (Vec::new(), Vec::new(), Vec::new());
+    for (at, (wall, ends)) in world.scene.walls.iter().zip(&truth).enumerate() {
+        let is_outer = wall.id.starts_with("wall");
+        let is_met = reflecting.contains(&at);
+        outer.extend(is_outer.then_some(*ends));
+        inner.extend((!is_outer && is_met).then_some(*ends));
+        met.extend(is_met.then_some(*ends));
+    }
     let is_found = |face: &&Ends| coverage(std::slice::from_ref(*face), &walls, 0.02, 2.0) > FOUND;
     let in_frame = |sweep: &sonard_inverse::FitSweep| motion.inverse_of(&sweep.pose);
     let is_true = |walls: &[Ends]| {
@@ -222,6 +220,7 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
         seed,
         recall,
         outer_recall: coverage(&outer, &walls, 0.02, 2.0),
+        met_recall: coverage(&met, &walls, 0.02, 2.0),
         faces: [inner.len(), inner.iter().filter(is_found).count()],
         posts: compared.posts,
         precision,
@@ -335,7 +334,7 @@ fn print_summary(kind: RoomKind, trials: &[Trial]) {
     let corners: Vec<f64> =
         trials.iter().flat_map(|trial| trial.corners_m.iter().copied()).collect();
     println!(
-        "| {kind} | {} | {} | {:.3} | {:.3} | {:.2} | {:.2} | {:.3} | {:.3} | {:.3} | {} | {:.2} | {:.3} | {} of {} | {} of {} | {} | {} | {} | {:.1} | {:.0} |",
+        "| {kind} | {} | {} | {:.3} | {:.3} | {:.2} | {:.2} | {:.3} | {:.3} | {:.3} | {} | {:.2} | {:.3} | {:.3} | {} of {} | {} of {} | {} | {} | {} | {:.1} | {:.0} |",
         trials.len(),
         trials.iter().filter(|trial| trial.is_complete()).count(),
         mean(&|trial| trial.recall),
@@ -349,6 +348,7 @@ fn print_summary(kind: RoomKind, trials: &[Trial]) {
         // Without the sign of a zero.
         trials.iter().map(|trial| trial.wrong_observed_m).sum::<f64>().max(0.0) + 0.0,
         mean(&|trial| trial.outer_recall),
+        mean(&|trial| trial.met_recall),
         trials.iter().map(|trial| trial.faces[1]).sum::<usize>(),
         trials.iter().map(|trial| trial.faces[0]).sum::<usize>(),
         trials.iter().map(|trial| trial.posts[1]).sum::<usize>(),

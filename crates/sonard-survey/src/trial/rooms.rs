@@ -7,7 +7,7 @@ use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
 use sonard_model::{
     geometry::{DVec2, Pose},
-    scene::{Cylinder, Scene, SceneError},
+    scene::{Cylinder, Scene, SceneError, Wall},
 };
 
 /// Kind of a random room.
@@ -25,12 +25,24 @@ pub enum RoomKind {
     Box,
     /// Rectangle or L with one to three posts.
     Posts,
+    /// T-shaped room.
+    T,
+    /// Rectangle, L or T with boxes at any angle, posts, and up to one partition.
+    Furnished,
 }
 
 impl RoomKind {
     /// All kinds.
-    pub const ALL: [Self; 6] =
-        [Self::Rectangle, Self::Oblique, Self::Cut, Self::L, Self::Box, Self::Posts];
+    pub const ALL: [Self; 8] = [
+        Self::Rectangle,
+        Self::Oblique,
+        Self::Cut,
+        Self::L,
+        Self::T,
+        Self::Box,
+        Self::Posts,
+        Self::Furnished,
+    ];
 
     /// Name of the kind, as parsed.
     #[must_use]
@@ -42,7 +54,15 @@ impl RoomKind {
             Self::L => "l",
             Self::Box => "box",
             Self::Posts => "posts",
+            Self::T => "t",
+            Self::Furnished => "furnished",
         }
+    }
+
+    /// Returns `true` for rooms that [`add_posts`] completes.
+    #[must_use]
+    pub const fn has_posts(self) -> bool {
+        matches!(self, Self::Posts | Self::Furnished)
     }
 }
 
@@ -81,6 +101,13 @@ pub fn draw_room(kind: RoomKind, random: &mut impl Rng) -> Result<Scene, SceneEr
             let outline = [RoomKind::Rectangle, RoomKind::L][random.random_range(0..2)];
             return draw_room(outline, random);
         }
+        RoomKind::Furnished => {
+            let outline =
+                [RoomKind::Rectangle, RoomKind::L, RoomKind::T][random.random_range(0..3)];
+            let mut room = draw_room(outline, random)?;
+            add_furniture(&mut room, random);
+            return Ok(room);
+        }
         RoomKind::Rectangle => vec![[0.0, 0.0], [w, 0.0], [w, d], [0.0, d]],
         RoomKind::Oblique => {
             let slant = random.random_range(0.2..0.9);
@@ -94,6 +121,22 @@ pub fn draw_room(kind: RoomKind, random: &mut impl Rng) -> Result<Scene, SceneEr
             (w, d) = (random.random_range(3.0..4.2), random.random_range(2.6..3.8));
             let (a, b) = (w * random.random_range(0.35..0.55), d * random.random_range(0.35..0.55));
             vec![[0.0, 0.0], [w, 0.0], [w, d - b], [w - a, d - b], [w - a, d], [0.0, d]]
+        }
+        RoomKind::T => {
+            (w, d) = (random.random_range(3.2..4.2), random.random_range(2.6..3.8));
+            let [a, b] = [0.25..0.35, 0.25..0.35].map(|share| w * random.random_range(share));
+            let e = d * random.random_range(0.35..0.55);
+            let [left, right, top] = [a, w - b, d - e];
+            vec![
+                [0.0, 0.0],
+                [w, 0.0],
+                [w, top],
+                [right, top],
+                [right, d],
+                [left, d],
+                [left, top],
+                [0.0, top],
+            ]
         }
         RoomKind::Box => {
             (w, d) = (random.random_range(3.2..4.2), random.random_range(2.8..3.8));
@@ -126,7 +169,51 @@ const CLEAR_M: f64 = 0.25;
 /// Returns `true` if a ranger fits at a place.
 #[must_use]
 pub fn is_free(scene: &Scene, at: DVec2) -> bool {
-    scene.clearance_m(at) > CLEAR_M && scene.are_accessible(&[at]) == [true]
+    is_within(scene, at, CLEAR_M)
+}
+
+/// Adds up to three boxes with sides of 0.3 to 0.8 m at any angle, at least 0.3 m from walls and
+/// each other, and in half of the rooms a partition of 0.5 to 1.5 m at a right angle to a wall.
+fn add_furniture(scene: &mut Scene, random: &mut impl Rng) {
+    const GAP_M: f64 = 0.3;
+    const MAX_TRIES: usize = 200;
+    let material = scene.walls[0].material;
+    let wall = |id: String, a, b| Wall { id: id.into(), a, b, material, z_m: None };
+    if random.random() {
+        let outer = &scene.walls[random.random_range(0..scene.walls.len())];
+        let from = outer.a.lerp(outer.b, random.random_range(0.3..0.7));
+        let inward = (outer.b - outer.a).normalize_or_zero().perp();
+        let to = from + random.random_range(0.5..1.5) * inward;
+        if is_within(scene, to, GAP_M) {
+            scene.walls.push(wall("partition-1".to_owned(), from, to));
+        }
+    }
+    let [low, high] = extent(scene);
+    let count = random.random_range(0..=3);
+    let mut boxes = 0;
+    for _ in 0..MAX_TRIES {
+        if boxes == count {
+            break;
+        }
+        let center = low + DVec2::new(random.random(), random.random()) * (high - low);
+        let half = 0.5 * DVec2::new(random.random_range(0.3..0.8), random.random_range(0.3..0.8));
+        let turn = DVec2::from_angle(random.random_range(0.0_f64..90.0).to_radians());
+        if !is_within(scene, center, half.length() + GAP_M) {
+            continue;
+        }
+        boxes += 1;
+        let corner = |signs: [f64; 2]| center + turn.rotate(half * DVec2::from_array(signs));
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(corner);
+        for side in 0..4 {
+            let id = format!("box-{boxes}-{}", side + 1);
+            scene.walls.push(wall(id, corners[side], corners[(side + 1) % 4]));
+        }
+    }
+}
+
+/// Returns `true` if a place is within the room, farther than a clearance from all walls.
+fn is_within(scene: &Scene, at: DVec2, clear_m: f64) -> bool {
+    scene.clearance_m(at) > clear_m && scene.are_accessible(&[at]) == [true]
 }
 
 /// Adds one to three posts with a radius of 2 to 12 cm, at least 0.3 m from walls, stops and each
@@ -144,8 +231,7 @@ pub fn add_posts(scene: &mut Scene, stops: &[Pose], random: &mut impl Rng) {
         let center = low + DVec2::new(random.random(), random.random()) * (high - low);
         let radius_m = random.random_range(0.02..0.12);
         let clear_m = radius_m + CLEAR_M;
-        let is_clear = scene.clearance_m(center) > clear_m
-            && scene.are_accessible(&[center]) == [true]
+        let is_clear = is_within(scene, center, clear_m)
             && stops.iter().all(|stop| stop.position().distance(center) > clear_m);
         if is_clear {
             let id = format!("post-{}", scene.cylinders.len() + 1).into();

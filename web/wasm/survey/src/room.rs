@@ -59,7 +59,7 @@ fn random_room(kind: Option<&str>, seed: u64) -> Result<(Scene, Pose), RequestEr
     let mut random = generator(kind, seed);
     let mut scene = draw_room(kind, &mut random)?;
     let course = draw_course(&scene, 1, &mut random);
-    if kind == RoomKind::Posts {
+    if kind.has_posts() {
         add_posts(&mut scene, &course, &mut random);
     }
     Ok((scene, course[0]))
