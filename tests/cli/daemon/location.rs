@@ -167,7 +167,7 @@ fn one_client_at_a_time() {
     // Everything else goes on meanwhile.
     assert_eq!(daemon.get("/v1/status").status, 200);
     drop(first);
-    let second = daemon.get(&room);
+    let second = daemon.send_when_free("GET", &room, "");
     assert_eq!(second.status, 200, "{}", String::from_utf8_lossy(&second.body));
     let found: Location = serde_json::from_value(second.json()).expect("a location");
     assert!((found.poses[0].x_m - 2.2).abs() < 0.02, "{found:?}");

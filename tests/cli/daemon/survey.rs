@@ -183,6 +183,6 @@ fn one_survey_at_a_time() {
     // A client that disconnects ends its survey: the next one begins.
     drop(begin());
     let short = json!({"scans": scans, "max_scenes": 1}).to_string();
-    let third = result(&daemon.send("POST", "/v1/survey", &short));
+    let third = result(&daemon.send_when_free("POST", "/v1/survey", &short));
     assert_eq!(third.survey.poses.len(), 6);
 }

@@ -140,6 +140,18 @@ impl Daemon {
         send_request(self.connect().expect("it listens"), method, path, &headers, body)
     }
 
+    /// Sends a request until no computation of another client occupies the daemon.
+    pub fn send_when_free(&self, method: &str, path: &str, body: &str) -> Reply {
+        let mut reply = self.send(method, path, body);
+        wait_until("no other computation", || {
+            if reply.status == 503 {
+                reply = self.send(method, path, body);
+            }
+            reply.status != 503
+        });
+        reply
+    }
+
     pub fn status(&self) -> Value {
         self.get("/v1/status").json()
     }
