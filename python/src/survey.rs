@@ -92,9 +92,9 @@ const INTERRUPT_INTERVAL: Duration = Duration::from_millis(50);
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "they are keywords where they are used")]
 #[pyo3(signature = (sweeps, poses = None, *, azimuths_deg = None, sensor = None, air = None,
-    odometry = Some((0.05, 5.0)), square = false, max_range_m = 5.0, reflectance = 0.97, fit = Vec::new(), view_reach_m = 1.5, max_scenes = 30_000,
+    odometry = Some((0.05, 5.0)), square = false, max_range_m = 5.0, reflectance = 0.97, fit = Vec::new(), view_reach_m = 1.5, max_scenes = 60_000,
     closed = false, progress = None),
-    text_signature = "(sweeps, poses=None, *, azimuths_deg=None, sensor=None, air=None, odometry=(0.05, 5.0), square=False, max_range_m=5.0, reflectance=0.97, fit=(), view_reach_m=1.5, max_scenes=30000, closed=False, progress=None)")]
+    text_signature = "(sweeps, poses=None, *, azimuths_deg=None, sensor=None, air=None, odometry=(0.05, 5.0), square=False, max_range_m=5.0, reflectance=0.97, fit=(), view_reach_m=1.5, max_scenes=60000, closed=False, progress=None)")]
 pub(crate) fn survey<'py>(
     py: Python<'py>,
     sweeps: &Bound<'py, PyAny>,

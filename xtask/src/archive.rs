@@ -49,6 +49,10 @@ pub(crate) fn pack(
         }
         Format::Xz(contents) => {
             let mut options = XzOptions::with_preset(9);
+            // Smaller for machine code: more context, less alignment, the longest matches.
+            options.lzma_options.lc = 4;
+            options.lzma_options.pb = 1;
+            options.lzma_options.nice_len = 273;
             if contents == Contents::X86 {
                 options.prepend_pre_filter(FilterType::BcjX86, 0);
             }

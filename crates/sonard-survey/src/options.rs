@@ -41,7 +41,7 @@ impl Default for SurveyOptions {
             reflectance: 0.97,
             fit: Vec::new(),
             view_reach_m: 1.5,
-            max_scenes: 30_000,
+            max_scenes: 60_000,
         }
     }
 }

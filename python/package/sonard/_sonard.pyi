@@ -463,7 +463,7 @@ def survey(
     reflectance: float = 0.97,
     fit: Sequence[str] = (),
     view_reach_m: float = 1.5,
-    max_scenes: int = 30000,
+    max_scenes: int = 60000,
     closed: bool = False,
     progress: Callable[[dict[str, Any]], object] | None = None,
 ) -> Survey: ...

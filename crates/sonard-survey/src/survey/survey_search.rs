@@ -55,8 +55,8 @@ const MAX_BOXES: usize = 3;
 const SHORT_M: f64 = 0.3;
 /// Maximum number of rounds.
 const MAX_ROUNDS: usize = 6;
-/// Share of all arcs unexplained from which a course may be wrong.
-const UNCERTAIN_SHARE: f64 = 0.2;
+/// Share of all arcs unexplained from which a course may be wrong, of a fine and of a coarse ranger.
+const UNCERTAIN_SHARE: [f64; 2] = [0.2, 0.07];
 /// Gain of a round below which the last one is not repeated, nats.
 const MIN_ROUND_GAIN: f64 = 0.5;
 const LAST_ROUND: &Round = &ROUNDS[ROUNDS.len() - 1];
@@ -114,12 +114,7 @@ impl<'a> SurveySearch<'a> {
     /// in other orders, and keeps the best.
     pub(super) fn run(&mut self) {
         self.run_from_course();
-        let count = self.workspace.arcs.len();
-        let tried = match self.begins_at_odometry() {
-            true => Vec::new(),
-            false => orders(count, self.options.odometry.is_some()),
-        };
-        for order in tried {
+        for order in self.further_orders() {
             if self.workspace.is_over() || !self.is_course_uncertain() {
                 break;
             }
@@ -133,6 +128,18 @@ impl<'a> SurveySearch<'a> {
             if self.score < before.score {
                 self.restore(before);
             }
+        }
+    }
+
+    /// Orders of the virtual maps from which a search that leaves arcs unexplained begins again.
+    ///
+    /// Where it began at odometry, the order of the course is the first, and none is left out: the
+    /// courses differ by the headings, which few arcs of a coarse ranger determine.
+    fn further_orders(&self) -> Vec<Vec<usize>> {
+        let count = self.workspace.arcs.len();
+        match self.begins_at_odometry() {
+            true => [vec![(0..count).collect()], orders(count, false)].concat(),
+            false => orders(count, self.options.odometry.is_some()),
         }
     }
 
@@ -182,7 +189,8 @@ impl<'a> SurveySearch<'a> {
     /// Returns `true` if more arcs are unexplained than in a plan whose poses are right.
     fn is_course_uncertain(&self) -> bool {
         let all: usize = self.workspace.arcs.iter().map(Vec::len).sum();
-        self.left().len() as f64 > UNCERTAIN_SHARE * all as f64
+        let share = UNCERTAIN_SHARE[usize::from(self.errors().is_coarse())];
+        self.left().len() as f64 > share * all as f64
     }
 
     /// Runs the rounds; where arcs remain unexplained, begins again from the long walls alone.
@@ -417,7 +425,7 @@ impl<'a> SurveySearch<'a> {
         for is_last in [false, false, true] {
             let sigma_m = errors.sigma_m(LAST_ROUND.sigma_m);
             let judge = Judge::of(self.workspace, &self.posed, sigma_m);
-            polish(&mut self.posed, &judge);
+            self.polish(&judge);
             let judge = Judge::of(self.workspace, &self.posed, sigma_m);
             let mut assessment = assess(&self.posed, &judge, self.covariance.as_ref());
             match assessment.better.take().filter(|_| !is_last) {
@@ -429,6 +437,19 @@ impl<'a> SurveySearch<'a> {
             }
         }
         unreachable!("the last assessment is returned")
+    }
+
+    /// Estimates poses and walls by the likelihood of all readings.
+    ///
+    /// With a coarse ranger an estimate that scores lower is dropped: where arcs end depends on a
+    /// sensitivity that is not known well, and its few wide beams let that move the poses.
+    fn polish(&mut self, judge: &Judge) {
+        let before = self.posed.clone();
+        polish(&mut self.posed, judge);
+        let score = |posed: &PosedPlan| judge.at(posed).score(&posed.plan, &posed.walls);
+        if self.errors().is_coarse() && score(&self.posed) < score(&before) {
+            self.posed = before;
+        }
     }
 
     pub(super) fn report_progress(&self, stage: SurveyStage) {
