@@ -11,6 +11,7 @@ mod output;
 mod progress;
 mod rooms;
 mod score;
+mod views;
 
 use std::process::ExitCode;
 

@@ -5,6 +5,9 @@
 //! round the nearest object at about a metre and then to the next. Its measurements are the only
 //! input of the line map ([`lines`](sonard_interpret::interpret::lines)). [`SimulatedRobot`] moves
 //! through a scene and measures it by the model.
+//!
+//! [`explore_views`] is another strategy: the robot drives to the next view of the survey of its
+//! sweeps.
 
 mod follow;
 mod ground;
@@ -13,10 +16,12 @@ mod objects;
 mod robot;
 #[cfg(test)]
 mod tests;
+mod views;
 
 pub use follow::{explore, explore_observed};
 pub use laser::Laser;
 pub use robot::{DriveOutcome, Robot, RobotSettings, SimulatedRobot, SonarLayout};
+pub use views::explore_views;
 
 use serde::Serialize;
 

@@ -7,7 +7,7 @@
 //!   Kuc);
 //! - [`explore`]: a simulated robot that maps a room with sonar, laser, or just-in-time sensing
 //!   (Dudek, Freedman and
-//!   Rekleitis);
+//!   Rekleitis), or by the next views of surveys;
 //! - [`pictures`]: explorations and reliability diagrams.
 //!
 //! The program `sonard-papers` runs them and prints the tables of the documentation. Programs that

@@ -96,6 +96,32 @@ fn explore_table_has_every_room() {
 }
 
 #[test]
+fn views_table_compares_the_maps_of_a_room() {
+    let arguments = ["benchmark", "views", "--kinds", "rectangle", "--rooms", "1"];
+    let further = ["--max-views", "4", "--max-stops", "8", "--odometry", "0.02,2"];
+    let output = run(&[&arguments[..], &further, &["--json"]].concat());
+    assert!(output.status.success(), "{}", stderr(&output));
+    let rows = json_lines(&String::from_utf8_lossy(&output.stdout));
+    let methods: Vec<&str> = rows.iter().filter_map(|row| row["method"].as_str()).collect();
+    let all = ["next-views", "sonar-lines", "just-in-time-lines"];
+    assert_eq!(methods, [all, all].concat());
+    for (row, odometry) in
+        rows.iter().zip([[0.0; 2], [0.02, 2.0]].into_iter().flat_map(|of| [of; 3]))
+    {
+        assert_eq!(row["odometry_per_m"], serde_json::json!(odometry), "{row}");
+        let share = |within: &str, of: &str| row[within][of].as_f64().expect("a share");
+        for of in ["recall", "precision"] {
+            assert!(share("within_10_cm", of) >= share("within_2_cm", of), "{row}");
+        }
+        if row["method"] == "next-views" {
+            assert_eq!(row["finished"], true, "{row}");
+            assert!(share("within_2_cm", "recall") > 0.995, "{row}");
+            assert!(row["stops"].as_u64() <= Some(4), "{row}");
+        }
+    }
+}
+
+#[test]
 fn wrong_input_names_the_valid_range() {
     let scene = ["explore", "--scene", "simple-room"];
     for (further, words) in [
@@ -108,6 +134,16 @@ fn wrong_input_names_the_valid_range() {
         let output = run(&[&scene[..], further].concat());
         assert_eq!(output.status.code(), Some(2), "{further:?}: {}", stderr(&output));
         assert!(stderr(&output).replace('\n', " ").contains(words), "{words}: {}", stderr(&output));
+    }
+    for (further, words) in [
+        (["--odometry", "0.3,5"], "from 0 to 0.2"),
+        (["--odometry", "0.1"], "use M,DEG"),
+        (["--kinds", "round"], "rectangle, oblique"),
+        (["--max-views", "1"], "2..=40"),
+    ] {
+        let output = run(&[&["benchmark", "views"][..], &further].concat());
+        assert_eq!(output.status.code(), Some(2), "{further:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains(words), "{words}: {}", stderr(&output));
     }
 }
 

@@ -1,12 +1,17 @@
-//! Trials of surveys: random rooms, simulated sweeps, and the comparison of a survey with the true
-//! room.
+//! Trials of surveys: random rooms, simulated sweeps, an exploring robot, and the comparison of a
+//! survey with the true room.
 
 mod compare;
+mod explorer;
 mod readings;
 mod rooms;
+#[cfg(test)]
+mod tests;
 
 pub use compare::{Comparison, Ends, RigidMotion, coverage, is_post_at};
+pub use explorer::{Explorer, ExplorerSettings, Way};
 pub use readings::{ReadingNoise, simulate_sweeps};
 pub use rooms::{
-    RoomKind, add_posts, draw_course, draw_place, draw_room, drift, extent, generator, is_free,
+    RoomKind, add_posts, draw_course, draw_place, draw_room, draw_trial, drift, extent, generator,
+    is_free,
 };

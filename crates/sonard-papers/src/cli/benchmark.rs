@@ -1,6 +1,6 @@
 //! Command `sonard-papers benchmark` with its verbs.
 
-use super::{Outcome, interpret, map, rooms, score};
+use super::{Outcome, interpret, map, rooms, score, views};
 
 /// Verbs of `sonard-papers benchmark`.
 #[derive(Debug, clap::Subcommand)]
@@ -14,6 +14,9 @@ pub(crate) enum Verb {
     /// Explore random rooms with sonar, laser and just-in-time sensing, and compare the maps
     #[command(long_about = rooms::ABOUT)]
     Explore(rooms::Args),
+    /// Explore random rooms by the next views of surveys and by lines, and compare the maps
+    #[command(long_about = views::ABOUT)]
+    Views(views::Args),
     /// Measure the calibration of the probabilities of `interpret` in random rooms
     #[command(long_about = interpret::ABOUT)]
     Interpret(interpret::Args),
@@ -24,6 +27,7 @@ pub(crate) fn run(verb: Verb) -> Outcome {
         Verb::Map(args) => map::run(&args),
         Verb::Score(args) => score::run(&args),
         Verb::Explore(args) => rooms::run(&args),
+        Verb::Views(args) => views::run(&args),
         Verb::Interpret(args) => interpret::run(&args),
     }
 }

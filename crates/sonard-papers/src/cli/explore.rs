@@ -95,8 +95,9 @@ pub(crate) enum SensingName {
     JustInTime,
 }
 
+/// [`SonarLayout`] as a command-line value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum RangerName {
+pub(crate) enum RangerName {
     /// Twelve sonars, rotated in place for 180 readings
     Ring,
     /// Single ranger on a stepper, 400 readings
@@ -197,6 +198,15 @@ impl SensingName {
     }
 }
 
+impl RangerName {
+    pub(crate) const fn layout(self) -> SonarLayout {
+        match self {
+            Self::Ring => SonarLayout::Ring,
+            Self::Stepper => SonarLayout::Stepper,
+        }
+    }
+}
+
 impl RobotArgs {
     /// Validated settings of robot and exploration.
     pub(crate) fn settings(&self) -> Result<(RobotSettings, ExploreSettings), Failure> {
@@ -211,12 +221,8 @@ impl RobotArgs {
                 return Err(Failure::input(format!("--{option} is {value}"), help));
             }
         }
-        let ranger = match self.ranger {
-            RangerName::Ring => SonarLayout::Ring,
-            RangerName::Stepper => SonarLayout::Stepper,
-        };
         let robot = RobotSettings {
-            ranger,
+            ranger: self.ranger.layout(),
             odometry_noise: self.odometry_noise,
             ..RobotSettings::default()
         };

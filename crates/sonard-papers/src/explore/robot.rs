@@ -69,6 +69,9 @@ pub struct RobotSettings {
     /// Relative standard deviation of the distance and of the turn of each drive. The resulting
     /// errors are unknown to the robot.
     pub odometry_noise: f64,
+    /// Standard deviations of the errors of each drive, also unknown to the robot: of the position,
+    /// metres per metre, ahead and to the left, and of the heading, degrees per metre.
+    pub drift_per_m: [f64; 2],
 }
 
 impl Default for RobotSettings {
@@ -80,6 +83,7 @@ impl Default for RobotSettings {
             radius_m: 0.15,
             range_sigma_m: 0.005,
             odometry_noise: 0.0,
+            drift_per_m: [0.0; 2],
         }
     }
 }
@@ -92,6 +96,7 @@ pub struct SimulatedRobot<'a, R> {
     rng: R,
     truth: Pose,
     odometry: Pose,
+    course: Vec<Pose>,
     error: Option<TooCostly>,
 }
 
@@ -103,7 +108,8 @@ impl<'a, R: Rng> SimulatedRobot<'a, R> {
     #[must_use]
     pub fn new(simulator: &'a Simulator, pose: Pose, settings: RobotSettings, rng: R) -> Self {
         let room = Reflectors::new(simulator.scene(), &simulator.scene().ray_plan());
-        Self { simulator, room, settings, rng, truth: pose, odometry: pose, error: None }
+        let (truth, odometry, course) = (pose, pose, Vec::new());
+        Self { simulator, room, settings, rng, truth, odometry, course, error: None }
     }
 
     /// Last error of the model. The affected sonar readings lack an echo, so the exploration is
@@ -119,9 +125,25 @@ impl<'a, R: Rng> SimulatedRobot<'a, R> {
         self.truth
     }
 
+    /// True poses of the sonar sweeps and laser turns, unknown to the exploration.
+    #[must_use]
+    pub fn course(&self) -> &[Pose] {
+        &self.course
+    }
+
     fn noise(&mut self) -> f64 {
         let unit: f64 = StandardNormal.sample(&mut self.rng);
         self.settings.odometry_noise * unit
+    }
+
+    /// Error of a drive per metre. Exact odometry takes no random numbers.
+    fn drift(&mut self, sigma_per_m: f64) -> f64 {
+        if sigma_per_m > 0.0 {
+            let unit: f64 = StandardNormal.sample(&mut self.rng);
+            sigma_per_m * unit
+        } else {
+            0.0
+        }
     }
 
     /// True pose turned to a direction in the robot's odometry frame.
@@ -166,6 +188,7 @@ impl<R: Rng> Robot for SimulatedRobot<'_, R> {
     }
 
     fn sonar(&mut self) -> Sweep {
+        self.course.push(self.truth);
         let point = self.simulator.at(self.truth.position());
         let (azimuths_deg, step_deg) = self.settings.ranger.azimuths_deg();
         let beams = azimuths_deg.zip(0..).map(|(azimuth_deg, index)| {
@@ -187,6 +210,7 @@ impl<R: Rng> Robot for SimulatedRobot<'_, R> {
     }
 
     fn laser_turn(&mut self) -> (LaserScan, u32) {
+        self.course.push(self.truth);
         let count = self.settings.laser.shots_per_turn();
         let directions_deg = (0..count).map(|shot| f64::from(shot) * 360.0 / f64::from(count));
         let pose = self.odometry;
@@ -204,9 +228,11 @@ impl<R: Rng> Robot for SimulatedRobot<'_, R> {
         }
         let turn_rad = wrap_pi(offset.to_angle() - self.odometry.direction_rad(0.0));
         let true_turn_rad = turn_rad * (1.0 + self.noise());
-        let stretch = 1.0 + self.noise();
+        let [position_per_m, heading_deg_per_m] = self.settings.drift_per_m;
+        let stretch = 1.0 + self.noise() + self.drift(position_per_m);
         self.truth.heading_deg = wrap_360(self.truth.heading_deg + true_turn_rad.to_degrees());
-        let direction = DVec2::from_angle(self.truth.direction_rad(0.0));
+        let sideways_rad = self.drift(position_per_m).atan();
+        let direction = DVec2::from_angle(self.truth.direction_rad(0.0) + sideways_rad);
         let free_m = self.free_distance_m(direction, length_m * stretch);
         let (driven_m, drive) = if free_m < length_m * stretch {
             ((free_m - BACK_OFF_M).max(0.0), DriveOutcome::Collided)
@@ -216,6 +242,7 @@ impl<R: Rng> Robot for SimulatedRobot<'_, R> {
         let true_place = self.truth.position() + driven_m * direction;
         let place = self.odometry.position() + driven_m / stretch * offset / length_m;
         (self.truth.x_m, self.truth.y_m) = true_place.into();
+        self.truth.heading_deg += driven_m * self.drift(heading_deg_per_m);
         let heading_deg = wrap_360(offset.to_angle().to_degrees());
         self.odometry = Pose { x_m: place.x, y_m: place.y, heading_deg };
         drive

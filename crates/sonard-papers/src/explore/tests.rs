@@ -9,10 +9,18 @@ use rayon::prelude::*;
 use super::*;
 use crate::trial::gallery;
 use sonard_interpret::interpret::lines::{MapError, map_error};
+use sonard_inverse::World;
 use sonard_model::{
     acoustics::{Air, Sensor},
+    geometry::wrap_180,
     model::{Options, Simulator},
     scene::Scene,
+};
+use sonard_survey::{
+    SurveyOptions,
+    trial::{
+        Comparison, Explorer, ExplorerSettings, ReadingNoise, RoomKind, draw_trial, generator,
+    },
 };
 
 fn simulator(scene: Scene) -> Simulator {
@@ -106,6 +114,42 @@ fn odometry_noise_is_hidden() {
     assert!((0.005..0.8).contains(&off_m), "{off_m}");
 }
 
+#[test]
+fn drift_has_its_standard_deviations() {
+    const RUNS: usize = 300;
+    let simulator = simulator(scene(ROOM));
+    let settings = RobotSettings { drift_per_m: [0.04, 5.0], ..RobotSettings::default() };
+    let start = Pose { x_m: 1.0, y_m: 1.5, heading_deg: 0.0 };
+    let mut random = rng(5);
+    let mut squares = [0.0; 3];
+    for _ in 0..RUNS {
+        let mut robot = SimulatedRobot::new(&simulator, start, settings, &mut random);
+        assert_eq!(robot.drive(DVec2::new(3.0, 1.5)), DriveOutcome::Arrived);
+        assert!(robot.pose().position().distance(DVec2::new(3.0, 1.5)) < 1e-9, "by odometry");
+        let truth = robot.truth();
+        let off = [truth.x_m - 3.0, truth.y_m - 1.5, wrap_180(truth.heading_deg)];
+        squares.iter_mut().zip(off).for_each(|(sum, off)| *sum += off * off);
+    }
+    // Two metres; the standard error of a deviation is 4 %.
+    for (sum, sigma) in squares.into_iter().zip([0.08, 0.08, 10.0]) {
+        let found = (sum / RUNS as f64).sqrt();
+        assert!((found / sigma - 1.0).abs() < 0.15, "{found} {sigma}");
+    }
+}
+
+#[test]
+fn course_has_the_true_pose_of_each_stop() {
+    let simulator = simulator(scene(ROOM));
+    let settings = RobotSettings { drift_per_m: [0.05, 5.0], ..RobotSettings::default() };
+    for sensing in Sensing::ALL {
+        let mut robot = SimulatedRobot::new(&simulator, MIDDLE, settings, rng(6));
+        let limited = ExploreSettings { max_stops: 5, ..ExploreSettings::default() };
+        let made = explore(&mut robot, sensing, &limited);
+        assert_eq!((robot.course().len(), robot.course()[0]), (made.stops.len(), MIDDLE));
+        assert_eq!(robot.course().last(), Some(&robot.truth()));
+    }
+}
+
 /// Robot whose sensors detect nothing.
 struct NoReadings(Pose);
 
@@ -155,6 +199,27 @@ fn exploration_is_reproducible() {
     let made = make();
     assert!(made.finished && made.collisions == 0, "{} stops", made.stops.len());
     assert_eq!(made, make());
+}
+
+/// A rectangle needs no more than one view, whatever the errors of odometry.
+#[test]
+fn views_complete_a_rectangle() {
+    let noise = ReadingNoise { sigma_db: 0.5, sigma_m: 0.001 };
+    let settings = ExplorerSettings { beams: 200, noise, odometry_per_m: [0.05, 5.0] };
+    let (room, course) =
+        draw_trial(RoomKind::Rectangle, 2, &mut generator(RoomKind::Rectangle, 1000))
+            .expect("a room");
+    let sensor = Sensor::preset("senscomp-6500").expect("a preset");
+    let options = Options { max_range_m: Some(4.0), ..Options::default() };
+    let world = World::new(Arc::new(room), sensor, Air::default(), options);
+    let mut explorer = Explorer::new(&world, settings);
+    let found = explore_views(&mut explorer, &course, &SurveyOptions::default(), 6, &mut rng(1000))
+        .expect("a survey");
+    assert!((2..=3).contains(&explorer.stops().len()), "{} stops", explorer.stops().len());
+    assert_eq!(found.next_view, None);
+    let Comparison { recall, precision, .. } =
+        Comparison::new(&found, &world.scene, explorer.stops());
+    assert!(recall > 0.995 && precision > 0.995, "{recall} {precision}");
 }
 
 /// Claims of the paper in the ten rooms of `sonard-papers benchmark explore`.

@@ -23,8 +23,8 @@ use sonard_survey::{
     NoObserver, OdometrySigma, PieceStatus, PostShape, SearchEnd, Survey, SurveyOptions,
     score_plan, survey,
     trial::{
-        Comparison, Ends, ReadingNoise, RigidMotion, RoomKind, add_posts, coverage, draw_course,
-        draw_place, draw_room, drift, generator, simulate_sweeps,
+        Comparison, Ends, ReadingNoise, RigidMotion, RoomKind, coverage, draw_place, draw_trial,
+        drift, generator, simulate_sweeps,
     },
 };
 
@@ -142,11 +142,7 @@ held | true room | score within 5 | wrong observed m | outer recall | recall of 
 
 fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn Error>> {
     let mut random = generator(kind, seed);
-    let mut room = draw_room(kind, &mut random)?;
-    let poses = draw_course(&room, settings.stops, &mut random);
-    if kind.has_posts() {
-        add_posts(&mut room, &poses, &mut random);
-    }
+    let (room, poses) = draw_trial(kind, settings.stops, &mut random)?;
     let sensor = Sensor::preset("senscomp-6500")?;
     let options = Options { max_range_m: Some(MAX_RANGE_M), ..Options::default() };
     let assumed = World::new(Arc::new(room), sensor, Air::default(), options);

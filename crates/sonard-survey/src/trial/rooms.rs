@@ -156,6 +156,23 @@ pub fn draw_room(kind: RoomKind, random: &mut impl Rng) -> Result<Scene, SceneEr
     if inside.is_empty() { room.build() } else { room.room("box", &turned(inside), "wall").build() }
 }
 
+/// Draws a room and a course of stops through it.
+///
+/// # Errors
+/// As [`draw_room`].
+pub fn draw_trial(
+    kind: RoomKind,
+    stops: usize,
+    random: &mut impl Rng,
+) -> Result<(Scene, Vec<Pose>), SceneError> {
+    let mut room = draw_room(kind, random)?;
+    let course = draw_course(&room, stops, random);
+    if kind.has_posts() {
+        add_posts(&mut room, &course, random);
+    }
+    Ok((room, course))
+}
+
 /// Extent of the walls of a scene: lower left and upper right, metres.
 #[must_use]
 pub fn extent(scene: &Scene) -> [DVec2; 2] {
