@@ -18,7 +18,6 @@ impl PlanCovariance {
     }
 
     /// Covariance with all entries multiplied.
-    #[cfg(test)]
     pub(crate) fn scaled(&self, by: f64) -> Self {
         Self { matrix: by * &self.matrix, columns: self.columns.clone() }
     }

@@ -56,7 +56,8 @@ pub(crate) fn refine(
     }
     let columns = LineColumns::new(posed);
     let normal = equations(posed, &columns, judge, gate_m)?;
-    Some(PlanCovariance::new(normal.covariance()?, columns))
+    let covariance = PlanCovariance::new(normal.covariance()?, columns);
+    Some(covariance.scaled(judge.workspace.errors.bias_factor().powi(2)))
 }
 
 /// Plan part of the way from one to another.

@@ -1,7 +1,7 @@
 //! Surveys of a real arena, whose plan was measured by hand, from five sweeps each.
 //!
 //! ```sh
-//! cargo run --release -p sonard-survey --example arena -- FOLDER
+//! cargo run --release -p sonard-survey --example arena -- FOLDER [--runs roberto-a,roberto-b] [--walls]
 //! ```
 //!
 //! The folder has `arena.json` and `arena-sweeps.json`.
@@ -42,6 +42,7 @@ struct Settings {
     options: SurveyOptions,
     /// SVG file.
     picture: Option<PathBuf>,
+    prints_walls: bool,
 }
 
 /// Survey of a run, with its figures.
@@ -73,6 +74,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (at, run) in arena.runs.iter().enumerate().filter(|(_, run)| is_selected(run)) {
         let trial = trial(&arena, at, &truth, &settings.options)?;
         print_trial(&run.name, &trial);
+        if settings.prints_walls {
+            print_walls(&trial, &truth);
+            print_poses(&trial, run);
+        }
         trials.push(trial);
     }
     print_means(&trials);
@@ -155,6 +160,39 @@ fn print_trial(name: &str, of: &Trial) {
         of.found.scored_scenes,
         of.seconds,
     );
+}
+
+/// Prints stretches of walls in the frame of the arena, with their share within 6 cm and 6 degrees of
+/// the walls measured, and the standard deviations of each wall.
+fn print_walls(of: &Trial, truth: &[Ends]) {
+    for wall in &of.found.walls {
+        for piece in &wall.pieces {
+            let ends = [piece.from_m, piece.to_m].map(|end| of.motion.of(end.into()));
+            let [m, deg] = TOLERANCES[1];
+            println!(
+                "#   {} {:.3} to {:.3} {:?} right {:.2} evidence {:.1} sigma {:.1?} deg {:.3?} m",
+                wall.id,
+                ends[0],
+                ends[1],
+                piece.status,
+                coverage(&[ends], truth, m, deg),
+                wall.evidence_nats,
+                wall.sigma_direction_deg,
+                wall.sigma_across_m,
+            );
+        }
+    }
+}
+
+/// Prints errors of poses in the frame of the arena, with their standard deviations.
+fn print_poses(of: &Trial, run: &Run) {
+    for (found, truth) in of.found.poses.iter().zip(&run.poses) {
+        let [off_m, off_deg] = of.motion.pose_errors(&[found.pose], &[*truth]);
+        println!(
+            "#   pose off {off_m:.3} m {off_deg:.1} deg, sigma {:.3?} m {:.1?} deg",
+            found.sigma_m, found.sigma_heading_deg
+        );
+    }
 }
 
 fn print_means(trials: &[Trial]) {
@@ -258,11 +296,13 @@ impl Settings {
             seed: 1,
             options: SurveyOptions { odometry: Some(odometry), ..SurveyOptions::default() },
             picture: None,
+            prints_walls: false,
         };
         let mut args = std::env::args().skip(1);
         while let Some(arg) = args.next() {
             let mut value = || args.next().ok_or(format!("{arg} needs a value"));
             match arg.as_str() {
+                "--walls" => settings.prints_walls = true,
                 "--runs" => settings.runs = Some(value()?.split(',').map(str::to_owned).collect()),
                 "--seed" => settings.seed = value()?.parse()?,
                 "--square" => settings.options.square_deg = Some(value()?.parse()?),
