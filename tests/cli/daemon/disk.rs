@@ -68,11 +68,12 @@ fn failed_sync_starts_a_new_log() {
     wait_until("the error", || daemon.status()["log"]["error"].is_string());
     let status = daemon.status();
     assert!(status["log"]["uncertain"].as_u64() > Some(0), "{status}");
+    let reports = |daemon: &Daemon| daemon.messages().matches("scanning is paused").count();
+    wait_until("the report", || reports(&daemon) > 0);
     // Another try neither succeeds nor leaves a file.
     std::thread::sleep(Duration::from_secs(1));
     assert!(daemon.status()["log"]["error"].is_string());
     assert_eq!(logs(folder.path()).len(), 1);
-    let reports = |daemon: &Daemon| daemon.messages().matches("scanning is paused").count();
     assert_eq!(reports(&daemon), 1, "{}", daemon.messages());
     set(folder.path(), "eio", false);
     wait_until("recovery", || daemon.status()["log"]["error"].is_null());
