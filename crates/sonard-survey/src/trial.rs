@@ -11,7 +11,4 @@ mod tests;
 pub use compare::{Comparison, Ends, RigidMotion, coverage, is_post_at};
 pub use explorer::{Explorer, ExplorerSettings, Way};
 pub use readings::{ReadingNoise, simulate_sweeps};
-pub use rooms::{
-    RoomKind, add_posts, draw_course, draw_place, draw_room, draw_trial, drift, extent, generator,
-    is_free,
-};
+pub use rooms::{RoomKind, draw_place, draw_trial, drift, extent, generator, is_free};

@@ -55,8 +55,9 @@ const MAX_BOXES: usize = 3;
 const SHORT_M: f64 = 0.3;
 /// Maximum number of rounds.
 const MAX_ROUNDS: usize = 6;
-/// Share of all arcs unexplained from which a course may be wrong, of a fine and of a coarse ranger.
-const UNCERTAIN_SHARE: [f64; 2] = [0.2, 0.07];
+/// Share of all arcs unexplained from which a course may be wrong, and that of a coarse ranger.
+const UNCERTAIN_SHARE: f64 = 0.2;
+const COARSE_UNCERTAIN_SHARE: f64 = 0.07;
 /// Gain of a round below which the last one is not repeated, nats.
 const MIN_ROUND_GAIN: f64 = 0.5;
 const LAST_ROUND: &Round = &ROUNDS[ROUNDS.len() - 1];
@@ -122,12 +123,10 @@ impl<'a> SurveySearch<'a> {
             if are_same_course(&map.poses, &self.posed.poses) {
                 continue;
             }
-            let before = self.state();
-            self.begin(map);
-            self.run_from_course();
-            if self.score < before.score {
-                self.restore(before);
-            }
+            self.try_search(|search| {
+                search.begin(map);
+                search.run_from_course();
+            });
         }
     }
 
@@ -155,12 +154,10 @@ impl<'a> SurveySearch<'a> {
         if self.left().is_empty() || workspace.is_over() {
             return;
         }
-        let continued = self.state();
-        self.restore(course);
-        self.run();
-        if self.score < continued.score {
-            self.restore(continued);
-        }
+        self.try_search(|search| {
+            search.restore(course);
+            search.run();
+        });
     }
 
     /// Refines a given plan by all rounds; returns its score, nats.
@@ -189,7 +186,10 @@ impl<'a> SurveySearch<'a> {
     /// Returns `true` if more arcs are unexplained than in a plan whose poses are right.
     fn is_course_uncertain(&self) -> bool {
         let all: usize = self.workspace.arcs.iter().map(Vec::len).sum();
-        let share = UNCERTAIN_SHARE[usize::from(self.errors().is_coarse())];
+        let share = match self.errors().is_coarse() {
+            true => COARSE_UNCERTAIN_SHARE,
+            false => UNCERTAIN_SHARE,
+        };
         self.left().len() as f64 > share * all as f64
     }
 
@@ -201,12 +201,12 @@ impl<'a> SurveySearch<'a> {
             if self.workspace.is_over() || self.left().is_empty() && !self.has_short_walls() {
                 break;
             }
-            let before = self.state();
-            // Their directions, mostly those of chance alignments, go with them.
-            self.posed = self.posed.without_short_walls(SHORT_M);
-            self.rounds(1);
-            if self.score < before.score {
-                self.restore(before);
+            let is_better = self.try_search(|search| {
+                // Their directions, mostly those of chance alignments, go with them.
+                search.posed = search.posed.without_short_walls(SHORT_M);
+                search.rounds(1);
+            });
+            if !is_better {
                 break;
             }
         }
@@ -233,15 +233,26 @@ impl<'a> SurveySearch<'a> {
             let grown =
                 (!self.workspace.is_over()).then(|| with_box(&self.posed, &judge, &self.left()));
             let Some(grown) = grown.flatten() else { break };
-            let before = self.state();
-            self.posed = grown;
-            self.refine(&judge, self.errors().gate_m(LAST_ROUND.gate_m));
-            self.rounds(ROUNDS.len() - 1);
-            if self.score < before.score {
-                self.restore(before);
+            let is_better = self.try_search(|search| {
+                search.posed = grown;
+                search.refine(&judge, search.errors().gate_m(LAST_ROUND.gate_m));
+                search.rounds(ROUNDS.len() - 1);
+            });
+            if !is_better {
                 break;
             }
         }
+    }
+
+    /// Searches on; returns `false`, and to the state before, if the result scores less.
+    fn try_search(&mut self, search: impl FnOnce(&mut Self)) -> bool {
+        let before = self.state();
+        search(self);
+        let is_worse = self.score < before.score;
+        if is_worse {
+            self.restore(before);
+        }
+        !is_worse
     }
 
     fn errors(&self) -> RangeErrors {
@@ -266,12 +277,12 @@ impl<'a> SurveySearch<'a> {
             let judge = Judge::of(self.workspace, &self.posed, self.errors().final_sigma_m());
             let moved = (!self.workspace.is_over()).then(|| relocated(&self.posed, &judge));
             let Some(poses) = moved.flatten() else { break };
-            let before = self.state();
-            let workspace = self.workspace;
-            self.begin(map_of_poses(&workspace.arcs, poses, &workspace.moves));
-            self.rounds(0);
-            if self.score < before.score {
-                self.restore(before);
+            let is_better = self.try_search(|search| {
+                let workspace = search.workspace;
+                search.begin(map_of_poses(&workspace.arcs, poses, &workspace.moves));
+                search.rounds(0);
+            });
+            if !is_better {
                 break;
             }
         }
@@ -444,11 +455,13 @@ impl<'a> SurveySearch<'a> {
     /// With a coarse ranger an estimate that scores lower is dropped: where arcs end depends on a
     /// sensitivity that is not known well, and its few wide beams let that move the poses.
     fn polish(&mut self, judge: &Judge) {
-        let before = self.posed.clone();
+        let is_coarse = self.errors().is_coarse();
+        let before = is_coarse.then(|| (self.posed.clone(), self.score_now(judge.sigma_m)));
         polish(&mut self.posed, judge);
-        let score = |posed: &PosedPlan| judge.at(posed).score(&posed.plan, &posed.walls);
-        if self.errors().is_coarse() && score(&self.posed) < score(&before) {
-            self.posed = before;
+        if let Some((posed, score)) = before
+            && self.score_now(judge.sigma_m) < score
+        {
+            self.posed = posed;
         }
     }
 

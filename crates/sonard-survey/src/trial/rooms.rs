@@ -60,8 +60,7 @@ impl RoomKind {
     }
 
     /// Returns `true` for rooms that [`add_posts`] completes.
-    #[must_use]
-    pub const fn has_posts(self) -> bool {
+    const fn has_posts(self) -> bool {
         matches!(self, Self::Posts | Self::Furnished)
     }
 }
@@ -88,12 +87,8 @@ pub fn generator(kind: RoomKind, seed: u64) -> Pcg64 {
     Pcg64::seed_from_u64(seed.wrapping_mul(1000).wrapping_add(kind as u64))
 }
 
-/// Draws a room of 2.2 to 4.2 m, turned by any angle up to a right one. A room with posts has none
-/// before [`add_posts`].
-///
-/// # Errors
-/// None: corners and materials are valid.
-pub fn draw_room(kind: RoomKind, random: &mut impl Rng) -> Result<Scene, SceneError> {
+/// Draws a room without posts.
+fn draw_room(kind: RoomKind, random: &mut impl Rng) -> Result<Scene, SceneError> {
     let (mut w, mut d) = (random.random_range(2.4..4.0), random.random_range(2.2..3.4));
     let mut inside = Vec::new();
     let outline = match kind {
@@ -156,10 +151,11 @@ pub fn draw_room(kind: RoomKind, random: &mut impl Rng) -> Result<Scene, SceneEr
     if inside.is_empty() { room.build() } else { room.room("box", &turned(inside), "wall").build() }
 }
 
-/// Draws a room and a course of stops through it.
+/// Draws a room of 2.2 to 4.2 m, turned by any angle up to a right one, and a course of stops
+/// through it.
 ///
 /// # Errors
-/// As [`draw_room`].
+/// None: corners and materials are valid.
 pub fn draw_trial(
     kind: RoomKind,
     stops: usize,
@@ -235,7 +231,7 @@ fn is_within(scene: &Scene, at: DVec2, clear_m: f64) -> bool {
 
 /// Adds one to three posts with a radius of 2 to 12 cm, at least 0.3 m from walls, stops and each
 /// other.
-pub fn add_posts(scene: &mut Scene, stops: &[Pose], random: &mut impl Rng) {
+fn add_posts(scene: &mut Scene, stops: &[Pose], random: &mut impl Rng) {
     const CLEAR_M: f64 = 0.3;
     const MAX_TRIES: usize = 5000;
     let [low, high] = extent(scene);
@@ -270,7 +266,7 @@ pub fn draw_place(scene: &Scene, random: &mut impl Rng) -> DVec2 {
 }
 
 /// Draws a course of stops, 0.4 to 0.8 m from each to the next, straight and with clearance.
-pub fn draw_course(scene: &Scene, stops: usize, random: &mut impl Rng) -> Vec<Pose> {
+fn draw_course(scene: &Scene, stops: usize, random: &mut impl Rng) -> Vec<Pose> {
     const MAX_TRIES: usize = 5000;
     let mut places = vec![draw_place(scene, random)];
     let mut heading_deg: f64 = random.random_range(0.0..360.0);

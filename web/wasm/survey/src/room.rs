@@ -5,7 +5,7 @@ use std::str::FromStr as _;
 use rand::RngExt as _;
 use serde::Deserialize;
 use sonard_model::{geometry::Pose, scene::Scene};
-use sonard_survey::trial::{RoomKind, add_posts, draw_course, draw_room, generator};
+use sonard_survey::trial::{RoomKind, draw_trial, generator};
 use sonard_wasm_module::RequestError;
 
 /// Kinds of which a room of any kind is one. Surveys with posts take minutes.
@@ -56,11 +56,6 @@ fn random_room(kind: Option<&str>, seed: u64) -> Result<(Scene, Pose), RequestEr
             QUICK[at]
         }
     };
-    let mut random = generator(kind, seed);
-    let mut scene = draw_room(kind, &mut random)?;
-    let course = draw_course(&scene, 1, &mut random);
-    if kind.has_posts() {
-        add_posts(&mut scene, &course, &mut random);
-    }
+    let (scene, course) = draw_trial(kind, 1, &mut generator(kind, seed))?;
     Ok((scene, course[0]))
 }
