@@ -219,7 +219,7 @@ impl<'a> Judge<'a> {
         self.workspace.scores.get_or(digest, sum)
     }
 
-    /// Digest of walls, posts, poses, standard deviation of ranges, freedom of headings, and sensor.
+    /// Digest of walls, posts, poses, standard deviation of ranges, freedom of headings, and model.
     fn digest(&self, segments: &[Segment]) -> u64 {
         let mut hasher = DefaultHasher::new();
         segments.len().hash(&mut hasher);
@@ -232,6 +232,8 @@ impl<'a> Judge<'a> {
         }
         self.are_headings_free.hash(&mut hasher);
         self.workspace.sensor.hash(&mut hasher);
+        // Without posts both are equal.
+        (self.workspace.single_contacts && !self.posts.is_empty()).hash(&mut hasher);
         hasher.finish()
     }
 

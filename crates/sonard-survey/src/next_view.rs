@@ -17,7 +17,7 @@ use crate::{
     options::SurveyOptions,
     posed::PosedPlan,
     readings::Outcome,
-    result::{NextView, ResolvedPart, SurveyedPost},
+    result::{NextView, OpenPart, ResolvedPart, SurveyedPost},
 };
 use free_space::FreeSpace;
 use hypotheses::{Hypothesis, hypotheses};
@@ -40,14 +40,15 @@ const MIN_SHARE: f64 = 0.02;
 ///
 /// The hypotheses are the plan, its alternatives, and the plan with one change each: without a
 /// stretch of wall or a post that is not observed, or with a gap between free ends closed. Their
-/// probabilities are by their scores, for gaps by the likelihood. The result is independent of the
-/// number of threads; it has no view if nothing is open, no place resolves anything, or the
-/// observer cancelled.
+/// probabilities are by their scores, for gaps by the likelihood. Where no place decides among them
+/// but arcs are unexplained, none of them is right, and the view is the place farthest from all
+/// stops. The result is independent of the number of threads; it has no view if nothing is open, no
+/// place resolves anything, or the observer cancelled.
 pub(crate) fn find_next_view(
     posed: &PosedPlan,
     judge: &Judge,
     assessment: &Assessment,
-    posts: &[SurveyedPost],
+    (posts, unexplained_arcs): (&[SurveyedPost], usize),
     options: &SurveyOptions,
 ) -> (f64, Option<NextView>) {
     let hypotheses = hypotheses(posed, judge, assessment, posts);
@@ -56,7 +57,39 @@ pub(crate) fn find_next_view(
     let is_open = open_nats > MIN_OPEN_NATS;
     let forecast = is_open.then(|| Forecast::new(judge, &hypotheses, &weights, options)).flatten();
     let view = forecast.and_then(|forecast| best_view(&forecast, posed, judge, options));
-    (open_nats, view)
+    let farthest = || {
+        let part = OpenPart::UnexplainedArcs { count: unexplained_arcs };
+        let resolves = vec![ResolvedPart { part, probability: 1.0, share: 1.0 }];
+        let pose =
+            (unexplained_arcs > 0).then(|| farthest_view(posed, judge, options)).flatten()?;
+        Some(NextView { pose, gain_nats: 0.0, resolves })
+    };
+    (open_nats, view.or_else(farthest))
+}
+
+/// Reachable place whose distance from the nearest stop is largest.
+fn farthest_view(posed: &PosedPlan, judge: &Judge, options: &SurveyOptions) -> Option<Pose> {
+    if judge.workspace.observer.is_cancelled() {
+        return None;
+    }
+    let walls = posed.plan.segments(&posed.walls);
+    let free = FreeSpace { walls: &walls, posts: &posed.posts, poses: &posed.poses, judge };
+    let to_stops_m = |place: &DVec2| {
+        let distances_m = posed.poses.iter().map(|pose| pose.position().distance(*place));
+        distances_m.fold(f64::INFINITY, f64::min)
+    };
+    let places = free.places(options.view_reach_m, MAX_SWEEPS).into_iter();
+    let place = places.max_by(|a, b| to_stops_m(a).total_cmp(&to_stops_m(b)))?;
+    pose_at(place, posed)
+}
+
+/// Pose at a place with the heading of the nearest stop.
+fn pose_at(place: DVec2, posed: &PosedPlan) -> Option<Pose> {
+    let nearest = |a: &&Pose, b: &&Pose| {
+        a.position().distance(place).total_cmp(&b.position().distance(place))
+    };
+    let heading_deg = posed.poses.iter().min_by(nearest)?.heading_deg;
+    Some(Pose { x_m: place.x, y_m: place.y, heading_deg })
 }
 
 fn best_view(
@@ -85,12 +118,8 @@ fn best_view(
         .filter(|(_, terms)| gain_nats(terms) >= NEAR_BEST * most_nats)
         .min_by(|a, b| a.0.distance(last).total_cmp(&b.0.distance(last)))
         .filter(|_| most_nats > MIN_GAIN_NATS)?;
-    let nearest = |a: &&Pose, b: &&Pose| {
-        a.position().distance(place).total_cmp(&b.position().distance(place))
-    };
-    let heading_deg = posed.poses.iter().min_by(nearest)?.heading_deg;
     Some(NextView {
-        pose: Pose { x_m: place.x, y_m: place.y, heading_deg },
+        pose: pose_at(place, posed)?,
         gain_nats: gain_nats(terms),
         resolves: forecast.resolved(terms),
     })

@@ -62,7 +62,8 @@ pub(crate) fn report(
     let posts = surveyed_posts(posed, &judge, &predictions, covariance);
     // The scenes of the search, without those of the next view.
     let scored_scenes = workspace.scored();
-    let (open_nats, next_view) = find_next_view(posed, &judge, assessment, &posts, options);
+    let open = (&posts[..], left.len());
+    let (open_nats, next_view) = find_next_view(posed, &judge, assessment, open, options);
     Survey {
         walls: assessment
             .walls

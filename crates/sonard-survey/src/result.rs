@@ -227,7 +227,8 @@ pub struct AlternativePlan {
 pub struct NextView {
     /// Place, reachable by a straight move from a stop, with the heading of the nearest stop.
     pub pose: Pose,
-    /// Expected decrease of the entropy by the readings there, nats.
+    /// Expected decrease of the entropy by the readings there, nats; 0 for a view chosen because of
+    /// unexplained arcs.
     pub gain_nats: f64,
     /// Open parts that they resolve, the largest share first.
     pub resolves: Vec<ResolvedPart>,
@@ -272,6 +273,11 @@ pub enum OpenPart {
     Alternative {
         /// Number among the alternatives, from 1.
         number: usize,
+    },
+    /// A plan that was not found: arcs that none explains.
+    UnexplainedArcs {
+        /// Number of arcs.
+        count: usize,
     },
 }
 

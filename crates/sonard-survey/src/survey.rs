@@ -67,8 +67,11 @@ pub fn resume_survey(
     for round in 1.. {
         let (world, reflectance) = fitter.world()?;
         let options = &SurveyOptions { reflectance, ..options.clone() };
-        let workspace = workspace(&world, sweeps, options, (observer, scores))?;
-        let workspace = workspace.following(scored, fitter.digest());
+        // Repeated contacts with posts take most of the time near them, and change few readings: the
+        // final estimate and the alternatives include them.
+        let workspace = workspace(&world, sweeps, options, (observer, scores))?
+            .following(scored, fitter.digest())
+            .with_single_contacts()?;
         workspace.limit_scenes((SEARCH_SHARE * options.max_scenes as f64) as usize);
         let mut search = SurveySearch::new(&workspace, options);
         match last.take() {
@@ -76,12 +79,16 @@ pub fn resume_survey(
             None => search.run(),
         }
         let early_end = search.early_end();
-        if search.fit_sensor(&mut fitter) && early_end.is_none() && round <= MAX_SENSOR_FITS {
-            last = Some(search.posed);
+        let is_changed = search.fit_sensor(&mut fitter);
+        let posed = search.posed;
+        if is_changed && early_end.is_none() && round <= MAX_SENSOR_FITS {
+            last = Some(posed);
             scored = workspace.into_scored();
             continue;
         }
+        let workspace = workspace.with_all_contacts()?;
         workspace.limit_scenes(options.max_scenes);
+        let mut search = SurveySearch::with_plan(&workspace, options, posed);
         search.report_progress(SurveyStage::Alternatives);
         let assessment = search.settle();
         let end = early_end.unwrap_or_else(|| search.last_end());
@@ -126,9 +133,9 @@ pub fn score_refined_plan(
 ) -> Result<f64, SurveyError> {
     let scores = PlanScores::default();
     let workspace = workspace(world, sweeps, options, (&NoObserver, &scores))?;
-    let mut search = SurveySearch::new(&workspace, options);
     let (plan, walls) = LineArrangement::of_walls(walls, poses, workspace.reach_m());
-    Ok(search.refine_given(PosedPlan { plan, walls, posts: Vec::new(), poses: poses.to_vec() }))
+    let given = PosedPlan { plan, walls, posts: Vec::new(), poses: poses.to_vec() };
+    Ok(SurveySearch::with_plan(&workspace, options, given).refine_given())
 }
 
 pub(crate) fn workspace<'a>(

@@ -8,11 +8,12 @@ use std::{
     },
 };
 
-use sonard_inverse::{FitSweep, World};
+use sonard_inverse::{FitSweep, World, WorldError};
 use sonard_model::model::Simulator;
 
 use crate::{
     arc::{Arc, find_arcs},
+    error::SurveyError,
     odometry::Move,
     progress::SurveyObserver,
     range_errors::RangeErrors,
@@ -27,6 +28,8 @@ pub(crate) struct Workspace<'a> {
     pub(crate) sweeps: &'a [FitSweep],
     /// Simulator of that world, whose scene gives material and options, without walls.
     pub(crate) simulator: Simulator,
+    /// Scores are without echoes that touch posts more than once, or a post and an edge.
+    pub(crate) single_contacts: bool,
     pub(crate) readings: Vec<Readings>,
     pub(crate) errors: RangeErrors,
     /// Standard deviation of directions of walls from a square axis, radians.
@@ -61,6 +64,7 @@ impl<'a> Workspace<'a> {
             world,
             sweeps,
             simulator,
+            single_contacts: false,
             readings,
             errors,
             square_rad,
@@ -79,6 +83,18 @@ impl<'a> Workspace<'a> {
     /// search.
     pub(crate) fn following(self, scored: HashSet<u64>, sensor: u64) -> Self {
         Self { scored: Mutex::new(scored), sensor, ..self }
+    }
+
+    /// Workspace whose scores leave out echoes that touch posts more than once, or a post and an edge.
+    pub(crate) fn with_single_contacts(self) -> Result<Self, SurveyError> {
+        let simulator = self.simulator.with_single_contacts().map_err(WorldError::from)?;
+        Ok(Self { simulator, single_contacts: true, ..self })
+    }
+
+    /// Workspace that scores all echoes.
+    pub(crate) fn with_all_contacts(self) -> Result<Self, SurveyError> {
+        let simulator = self.world.simulator(&self.sweeps[0].pose)?;
+        Ok(Self { simulator, single_contacts: false, ..self })
     }
 
     /// Workspace with the face left of the axis, metres.

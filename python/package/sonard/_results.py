@@ -391,8 +391,9 @@ class UnexplainedArc:
 class ResolvedPart:
     """Possible difference from the best plan that a view resolves."""
 
-    kind: Literal["wall", "gap", "post", "alternative"]
-    """A stretch of wall or a post that may be absent, walls at free ends that may be present, or another plan."""
+    kind: Literal["wall", "gap", "post", "alternative", "unexplained_arcs"]
+    """A stretch of wall or a post that may be absent, walls at free ends that may be present, another plan, or one that was not
+    found: arcs that none explains."""
     name: str | None
     """Name of the wall or post."""
     ends: NDArray[np.float64]
@@ -412,7 +413,7 @@ class NextView:
     pose: NDArray[np.float64]
     """Place and a heading, which is irrelevant for a full turn: x and y in metres, degrees."""
     gain_nats: float
-    """Expected decrease of ``open_nats`` by the readings there, nats."""
+    """Expected decrease of ``open_nats`` by the readings there, nats; 0 for a view chosen because of unexplained arcs."""
     resolves: tuple[ResolvedPart, ...]
     """Open parts that they resolve, the largest share first."""
 

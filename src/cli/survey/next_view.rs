@@ -8,6 +8,17 @@ pub(super) fn sentences(found: &Survey) -> (String, Vec<String>) {
     match &found.next_view {
         None if found.open_nats < 0.005 => ("none: nothing is open".to_owned(), Vec::new()),
         None => (format!("none: no reachable place resolves the {open} that are open"), Vec::new()),
+        Some(NextView { pose, resolves, .. })
+            if let [ResolvedPart { part: OpenPart::UnexplainedArcs { count }, .. }] =
+                resolves[..] =>
+        {
+            let at = place([pose.x_m, pose.y_m]);
+            let arcs = if count == 1 { "1 arc is".to_owned() } else { format!("{count} arcs are") };
+            let text = format!(
+                "a full turn at {at}, far from the stops: {arcs} unexplained by the plans found"
+            );
+            (text, Vec::new())
+        }
         Some(NextView { pose, gain_nats, resolves }) => {
             let at = place([pose.x_m, pose.y_m]);
             let text =
@@ -28,6 +39,7 @@ fn part(of: &ResolvedPart) -> String {
         }
         OpenPart::Post { post } => format!("no {post}"),
         OpenPart::Alternative { number } => format!("alternative {number}"),
+        OpenPart::UnexplainedArcs { .. } => "another that was not found".to_owned(),
     };
     format!(
         "{:.0} % of it: the plan, or {question} (probability {:.2})",

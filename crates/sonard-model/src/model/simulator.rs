@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use thiserror::Error;
 
 use super::{
-    Cone, Engine, EngineOptions, Fan, ObservationPoint, Options, Prediction,
+    Cone, Engine, EngineOptions, Fan, ObservationPoint, Options, PathOptions, Prediction,
     cost::TooCostly,
     lazy::{LazyArrivals, ReachEstimate},
     options::OutOfRange,
@@ -74,6 +74,8 @@ struct RangerSetup {
     /// The pattern with the bounds of [`paths`], computed for the first engine of that kind.
     bounded: OnceLock<Arc<BoundedPattern>>,
     scatter_height_rad: f64,
+    /// Leaves out echoes with more than one contact with cylinders and edges beside a cylinder.
+    single_contacts: bool,
     expected: ReachEstimate,
 }
 
@@ -84,11 +86,17 @@ impl RangerSetup {
         Ok(Simulator { scene, ranger: self, engine })
     }
 
+    fn path_settings(&self, options: &PathOptions) -> paths::PathSettings {
+        let Self { sensor, air, receiver, scatter_height_rad, single_contacts, .. } = self;
+        let settings = path_settings(sensor, air, options, receiver, *scatter_height_rad);
+        if *single_contacts { settings.with_single_contacts() } else { settings }
+    }
+
     fn engine(&self, scene: &Scene) -> Box<dyn Engine> {
         let Self { sensor, air, receiver, beam, .. } = self;
         match &self.options.engine {
             EngineOptions::Paths(paths) => {
-                let settings = path_settings(sensor, air, paths, receiver, self.scatter_height_rad);
+                let settings = self.path_settings(paths);
                 let wave_number_per_m = settings.wave_number_per_m;
                 let face = sensor.face.map(|face| Disc { face, wave_number_per_m });
                 let bounded = || Arc::new(BoundedPattern::new(beam.clone(), face));
@@ -150,6 +158,7 @@ impl Simulator {
             beam,
             bounded,
             scatter_height_rad,
+            single_contacts: false,
             expected,
         };
         Arc::new(ranger).simulator(scene)
@@ -162,6 +171,26 @@ impl Simulator {
     /// When the transducer would be in the floor or above the ceiling.
     pub fn in_scene(&self, scene: Arc<Scene>) -> Result<Self, ModelError> {
         Arc::clone(&self.ranger).simulator(scene)
+    }
+
+    /// Returns the same ranger and scene without the echoes that touch cylinders more than once, or a
+    /// cylinder and an upright edge. They are weak, and finding them takes most of the time near
+    /// cylinders: a search among many scenes can leave them to its last comparison.
+    ///
+    /// # Errors
+    /// As [`in_scene`](Self::in_scene).
+    pub fn with_single_contacts(&self) -> Result<Self, ModelError> {
+        let RangerSetup { sensor, receiver, beam, bounded, .. } = &*self.ranger;
+        let ranger = RangerSetup {
+            sensor: sensor.clone(),
+            receiver: receiver.clone(),
+            beam: beam.clone(),
+            bounded: bounded.clone(),
+            single_contacts: true,
+            expected: ReachEstimate::default(),
+            ..*self.ranger
+        };
+        Arc::new(ranger).simulator(Arc::clone(&self.scene))
     }
 
     /// Prepares for firing from `position` (world, metres). The costly part is done at the first
@@ -220,8 +249,7 @@ impl Simulator {
     #[must_use]
     pub fn path_settings(&self) -> paths::PathSettings {
         let options = self.ranger.options.engine.paths().copied().unwrap_or_default();
-        let RangerSetup { sensor, air, receiver, scatter_height_rad, .. } = &*self.ranger;
-        path_settings(sensor, air, &options, receiver, *scatter_height_rad)
+        self.ranger.path_settings(&options)
     }
 
     /// Returns an engine for crosstalk from other transducers, up to a length of path in metres;

@@ -81,12 +81,20 @@ struct SearchState<'a> {
 }
 
 impl<'a> SurveySearch<'a> {
+    /// Begins with a given plan.
+    pub(super) fn with_plan(
+        workspace: &'a Workspace<'a>,
+        options: &'a SurveyOptions,
+        posed: PosedPlan,
+    ) -> Self {
+        Self { workspace, options, features: Vec::new(), posed, covariance: None, score: None }
+    }
+
     /// Begins with the poses of the virtual map.
     pub(super) fn new(workspace: &'a Workspace<'a>, options: &'a SurveyOptions) -> Self {
         let start = workspace.readings[0].odometry;
-        let posed = PosedPlan::without_walls(Vec::new());
-        let mut search =
-            Self { workspace, options, features: Vec::new(), posed, covariance: None, score: None };
+        let empty = PosedPlan::without_walls(Vec::new());
+        let mut search = Self::with_plan(workspace, options, empty);
         search.report_progress(SurveyStage::Course);
         if search.begins_at_odometry() {
             // Few arcs, which cut each other, determine poses less well than odometry.
@@ -160,9 +168,8 @@ impl<'a> SurveySearch<'a> {
         });
     }
 
-    /// Refines a given plan by all rounds; returns its score, nats.
-    pub(super) fn refine_given(&mut self, posed: PosedPlan) -> f64 {
-        self.posed = posed;
+    /// Refines the plan by all rounds; returns its score, nats.
+    pub(super) fn refine_given(&mut self) -> f64 {
         for (number, round) in ROUNDS.iter().enumerate() {
             let sigma_m = self.errors().sigma_m(round.sigma_m);
             let judge = Judge::of(self.workspace, &self.posed, sigma_m);
@@ -430,9 +437,11 @@ impl<'a> SurveySearch<'a> {
         if self.left().is_empty() { SearchEnd::Complete } else { SearchEnd::UnexplainedArcs }
     }
 
-    /// Judges the walls; continues with an alternative that is better.
+    /// Refines and judges the walls; continues with an alternative that is better.
     pub(super) fn settle(&mut self) -> Assessment {
         let errors = self.errors();
+        let judge = Judge::of(self.workspace, &self.posed, errors.sigma_m(LAST_ROUND.sigma_m));
+        self.refine(&judge, errors.gate_m(LAST_ROUND.gate_m));
         for is_last in [false, false, true] {
             let sigma_m = errors.sigma_m(LAST_ROUND.sigma_m);
             let judge = Judge::of(self.workspace, &self.posed, sigma_m);

@@ -61,11 +61,12 @@ fn view_is_on_the_side_that_decides() {
         walls.iter().enumerate().map(|(line, &[a, b])| Segment { line, a, b }).collect()
     };
     let posed = PosedPlan { plan, walls: set, posts: Vec::new(), poses: poses.to_vec() };
-    let view = |alternatives: Vec<(Vec<Segment>, f64)>, reach_m: f64| {
+    let find = |alternatives: Vec<(Vec<Segment>, f64)>, unexplained: usize, reach_m: f64| {
         let assessment = Assessment { walls: Vec::new(), alternatives, better: None };
         let options = SurveyOptions { view_reach_m: reach_m, ..options() };
-        find_next_view(&posed, &judge, &assessment, &[], &options)
+        find_next_view(&posed, &judge, &assessment, (&[], unexplained), &options)
     };
+    let view = |alternatives, reach_m| find(alternatives, 0, reach_m);
     let (open_nats, found) = view(vec![(segments(&walls), 0.0)], 1.5);
     assert!((open_nats - 2.0_f64.ln()).abs() < 0.05, "{open_nats}");
     let found = found.expect("a view");
@@ -83,6 +84,13 @@ fn view_is_on_the_side_that_decides() {
     // With a single plan there is no view.
     let (open_nats, none) = view(Vec::new(), 1.5);
     assert!(open_nats < 0.1 && none.is_none(), "{open_nats} {none:?}");
+    // Unless arcs contradict it: then anywhere new.
+    let (_, found) = find(Vec::new(), 2, 1.5);
+    let found = found.expect("a view");
+    assert_eq!(found.resolves[0].part, OpenPart::UnexplainedArcs { count: 2 });
+    let distances_m = poses.map(|pose| pose.position().distance(found.pose.position()));
+    assert!(distances_m.into_iter().all(|distance_m| distance_m > 1.0), "{found:?}");
+    assert_eq!((found.gain_nats, find(Vec::new(), 2, 0.0).1), (0.0, None));
 }
 
 /// Corners of an L in the frame of the rectangle.

@@ -67,6 +67,13 @@ impl PathSettings {
         }
     }
 
+    /// Returns the settings without echoes of more than one contact with cylinders and edges, one of
+    /// them a cylinder.
+    #[must_use]
+    pub fn with_single_contacts(self) -> Self {
+        Self { repeated_contact_ratio: f64::INFINITY, unrestricted_m: 0.0, ..self }
+    }
+
     pub(crate) fn allows(&self, order: u16) -> bool {
         self.max_order.is_none_or(|bound| order <= bound)
     }

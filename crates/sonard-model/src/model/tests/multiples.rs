@@ -62,3 +62,35 @@ fn length_is_that_of_all_rounds() {
         assert_eq!(arrival.path.interactions.len(), 2 * rounds as usize - 1);
     }
 }
+
+/// With single contacts the arrivals are those of all that touch a cylinder at most once, and no edge
+/// besides.
+#[test]
+fn single_contacts_are_a_part_of_all() {
+    let mut room = scene(vec![
+        wall("left", (-1.0, -1.0), (-1.0, 2.0), 0.97),
+        wall("top", (-1.0, 2.0), (2.0, 2.0), 0.97),
+        wall("pier", (1.2, -0.6), (1.2, 0.2), 0.97),
+    ]);
+    room.cylinders = vec![cylinder((0.7, 0.6), 0.35), cylinder((-0.4, 0.7), 0.3)];
+    let all = simulator(room, Options::default());
+    let single = all.with_single_contacts().expect("the same scene");
+    let contacts = |path: &Path| {
+        let is_round = |of: &Reflector| matches!(of, Reflector::Cylinder(_));
+        let round = path.reflectors().filter(is_round).count();
+        if round == 0 { 0 } else { round + path.diffractors().count() }
+    };
+    let (from, mut repeated) = (DVec2::new(0.1, -0.3), 0);
+    for direction_deg in (-180..180).step_by(15) {
+        let of = |simulator: &Simulator| {
+            let found = simulator.at(from).arrivals(f64::from(direction_deg).to_radians());
+            found.expect("few paths")
+        };
+        let (mut expected, found) = (of(&all), of(&single));
+        let count = expected.len();
+        expected.retain(|arrival| contacts(&arrival.path) <= 1);
+        repeated += count - expected.len();
+        assert_eq!(found, expected, "{direction_deg}");
+    }
+    assert!(repeated > 10, "{repeated}");
+}
