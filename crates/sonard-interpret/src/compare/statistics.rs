@@ -20,3 +20,18 @@ pub fn keep_every_second<T>(kept: &mut Vec<T>) {
         index % 2 == 1
     });
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_second_is_kept() {
+        for (count, expected) in [(0, vec![]), (1, vec![0]), (5, vec![0, 2, 4]), (6, vec![0, 2, 4])]
+        {
+            let mut kept: Vec<usize> = (0..count).collect();
+            keep_every_second(&mut kept);
+            assert_eq!(kept, expected);
+        }
+    }
+}

@@ -140,3 +140,24 @@ fn scene_files_match_shipped_names() {
     shipped.sort();
     assert_eq!(files, shipped);
 }
+
+/// A point is as far from a scene as from its nearest wall or cylinder.
+#[test]
+fn clearance_is_the_smallest_distance() {
+    let mut scene = Scene::builder("room")
+        .material("wood", 0.9)
+        .walls("wall", &[[0.0, 0.0], [4.0, 0.0]], "wood")
+        .build()
+        .expect("a scene");
+    assert_eq!(scene.clearance_m(DVec2::new(2.0, 1.5)), 1.5);
+    assert_eq!(scene.clearance_m(DVec2::new(7.0, 4.0)), 5.0);
+    let material = scene.walls[0].material;
+    let center = DVec2::new(2.0, 3.0);
+    scene.cylinders =
+        vec![Cylinder { id: "post".into(), center, radius_m: 0.5, material, z_m: None }];
+    assert_eq!(scene.clearance_m(DVec2::new(2.0, 2.0)), 0.5);
+    assert_eq!(scene.clearance_m(DVec2::new(2.0, 1.0)), 1.0);
+    assert_eq!(scene.clearance_m(center), -0.5);
+    (scene.walls, scene.cylinders) = Default::default();
+    assert_eq!(scene.clearance_m(center), f64::INFINITY);
+}

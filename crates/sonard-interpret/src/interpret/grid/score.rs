@@ -185,3 +185,25 @@ fn neighbours(shape: &GridShape, at: usize) -> impl Iterator<Item = (usize, u32)
         inside.then_some(((y * width + x) as usize, if dx == 0 || dy == 0 { 5 } else { 7 }))
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sonard_model::geometry::DVec2;
+
+    /// Cells of 3 by 3: all eight around the middle, three at a corner.
+    #[test]
+    fn neighbours_are_inside() {
+        let shape = GridShape { origin: DVec2::ZERO, resolution_m: 0.1, width: 3, height: 3 };
+        let of = |at: usize| {
+            let mut found: Vec<(usize, u32)> = neighbours(&shape, at).collect();
+            found.sort_unstable();
+            found
+        };
+        let around = [(0, 7), (1, 5), (2, 7), (3, 5), (5, 5), (6, 7), (7, 5), (8, 7)];
+        assert_eq!(of(4), around);
+        assert_eq!(of(0), [(1, 5), (3, 5), (4, 7)]);
+        assert_eq!(of(5), [(1, 7), (2, 5), (4, 5), (7, 7), (8, 5)]);
+        assert_eq!(of(8), [(4, 7), (5, 5), (7, 5)]);
+    }
+}

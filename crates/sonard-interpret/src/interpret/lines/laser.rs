@@ -149,3 +149,43 @@ fn join_corners(lines: &mut [MapLine]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::interpret::lines::LineKind;
+
+    fn line(ends: [[f64; 2]; 2]) -> MapLine {
+        MapLine {
+            ends: ends.map(DVec2::from),
+            terminal: [false; 2],
+            kind: LineKind::Laser,
+            confidence: 1.0,
+            seen_from: DVec2::ZERO,
+        }
+    }
+
+    /// Ends are moved only if both are near the corner.
+    #[test]
+    fn corners_need_both_ends() {
+        let floor = line([[0.0, 0.0], [1.0, 0.0]]);
+        let mut near = [floor, line([[1.06, 0.04], [1.06, 1.0]])];
+        join_corners(&mut near);
+        let corner = DVec2::new(1.06, 0.0);
+        assert!(
+            near[0].ends[1].distance(corner) < 1e-12 && near[1].ends[0].distance(corner) < 1e-12
+        );
+        assert_eq!((near[0].terminal, near[1].terminal), ([false, true], [true, false]));
+        // Too far from each other, and the corner too far from the one or the other.
+        for far in [
+            [[1.06, 0.09], [1.06, 1.0]],
+            [[1.06, 0.03], [0.61, 0.33]],
+            [[0.99, 0.04], [0.49, 0.24]],
+        ] {
+            let before = [floor, line(far)];
+            let mut lines = before;
+            join_corners(&mut lines);
+            assert_eq!(lines, before);
+        }
+    }
+}

@@ -218,6 +218,25 @@ mod tests {
     }
 
     #[test]
+    fn bound_is_above_the_field_in_all_directions() {
+        for radius_m in [0.002, 0.01, 0.0165] {
+            let post = Post::new(radius_m, 1.0, K).expect("thin");
+            for distance_m in [0.05, 0.5, 5.0] {
+                let field = |step: i32| {
+                    let out_rad = PI * f64::from(step) / 90.0;
+                    post.echo(&Aspect { in_rad: 0.0, out_rad, distance_m }).norm()
+                };
+                let most = (0..=90).map(field).fold(0.0, f64::max);
+                let bound = post.bound(distance_m);
+                assert!(
+                    most <= bound && bound < 2.0 * most,
+                    "{radius_m} {distance_m}: {most} {bound}"
+                );
+            }
+        }
+    }
+
+    #[test]
     fn absorption_keeps_the_shadow() {
         let post = |reflectance| Post::new(0.015, reflectance, K).expect("thin");
         let field = |reflectance: f64, out_rad: f64| {
