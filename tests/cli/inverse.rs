@@ -282,7 +282,8 @@ fn height_and_correlations() {
         "floor_z_m": 0.0, "ceiling_z_m": 1.6, "poses": {"here": {"x_m": 1.0, "y_m": 0.8, "heading_deg": 20}}}"#;
     let scene = folder.path().join("room.json");
     fs::write(&scene, room).expect("room on the disk");
-    let log = sweep(folder.path(), scene.to_str().expect("a plain path"), "here", &[]);
+    let scene = scene.to_str().expect("a plain path");
+    let log = sweep(folder.path(), scene, "here", &["--step-deg", "3.6"]);
     let fit = ["calibrate", &log, "--fit", "pose,heading,height"];
     let found = lines(&[&fit[..], &["--json"]].concat());
     let height = found.iter().find(|line| line["name"] == "height_m").expect("a height");

@@ -17,9 +17,9 @@ fn random_moves_are_exact() {
     let home = bench.device.steps();
     let mut step = 0_i32;
     let mut moved = 0;
-    for number in 0..10_000 {
-        let speed = [800, 2_000, 4_000, 10_000][number / 2_500];
-        if number % 2_500 == 0 {
+    for number in 0..4_000 {
+        let speed = [800, 2_000, 4_000, 10_000][number / 1_000];
+        if number % 1_000 == 0 {
             bench.perform(Command::Configure(Settings { speed, ..QUICK }), 2.0).expect("set up");
         }
         bench.device.take_pulses();
@@ -31,7 +31,7 @@ fn random_moves_are_exact() {
         moved += pulses.len();
         step = target;
     }
-    println!("10000 moves, {moved} steps");
+    println!("4000 moves, {moved} steps");
     let events = bench.perform(Command::Status, 2.0).expect("answers");
     let status = events.iter().find_map(|event| match event {
         HostEvent::Done(Outcome::Status(status)) => Some(*status),

@@ -23,8 +23,8 @@ impl Case {
         fs::write(&way, "x_m,y_m,heading_deg\n0.8,0.05,92\n0.4,0.3,10\n0.2,0.3,200\n")
             .expect("room on the disk");
         let simulate = ["simulate", "--scene", "simple-room", "--poses", &way];
-        let noise = ["--jitter-us", "6", "--temperature-c", "15", "-o", &log];
-        let output = run(&[&simulate[..], &noise].concat());
+        let noise = ["--jitter-us", "6", "--temperature-c", "15"];
+        let output = run(&[&simulate[..], &noise, &["--step-deg", "3.6", "-o", &log]].concat());
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
         Self { folder, log }
     }

@@ -100,7 +100,7 @@ fn wall_roughness() {
     let noise = TofNoise::from_range_sigma_mm(1.0, truth.air.sound_speed_m_s());
     // From two positions: for a single sweep, phases could explain scattered sound as well.
     let other = Pose { x_m: 2.0, y_m: 1.3, heading_deg: 0.0 };
-    let sweeps = [pose, other].map(|pose| sweep(&truth, &pose, &pose, 240, noise, 3));
+    let sweeps = [pose, other].map(|pose| sweep(&truth, &pose, &pose, 120, noise, 3));
     let given = [("roughness brick".to_owned(), 0.3)];
     let priors = priors(&[ParameterGroup::Roughness], &given, &here, 2).expect("it is fitted");
     let what = FitOptions::with_priors(priors, 0.02);
