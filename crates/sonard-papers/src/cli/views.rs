@@ -3,7 +3,6 @@
 use std::{
     fmt,
     io::{self, Write},
-    sync::Arc,
 };
 
 use comfy_table::{CellAlignment, Table};
@@ -13,11 +12,7 @@ use rustix::time::{ClockId, clock_gettime};
 use serde::Serialize;
 
 use sonard_inverse::World;
-use sonard_model::{
-    acoustics::{Air, Sensor},
-    geometry::Pose,
-    model::Options,
-};
+use sonard_model::geometry::Pose;
 use sonard_papers::explore::{
     ExploreSettings, RobotSettings, Sensing, SimulatedRobot, explore, explore_views,
 };
@@ -25,7 +20,7 @@ use sonard_survey::{
     OdometrySigma, SurveyOptions,
     trial::{
         Comparison, Ends, Explorer, ExplorerSettings, ReadingNoise, RigidMotion, RoomKind,
-        coverage, draw_trial, generator,
+        coverage, draw_trial, generator, trial_world,
     },
 };
 
@@ -89,8 +84,6 @@ wall: within 2 cm and 2 degrees, and within 10 cm and 5 degrees. Maps are compar
 lays the stops by the map on the true ones: by the survey's poses, or by odometry. Processor time includes the \
 simulation of the readings.";
 
-/// Maximum range of the rangers, metres.
-const MAX_RANGE_M: f64 = 4.0;
 /// Number of beams of a sweep.
 const BEAMS: usize = 400;
 /// Noise of readings.
@@ -241,10 +234,7 @@ impl Room {
         first_stops: usize,
     ) -> Result<Self, Box<dyn std::error::Error>> {
         let (scene, course) = draw_trial(kind, first_stops, &mut generator(kind, seed))?;
-        let sensor = Sensor::preset("senscomp-6500")?;
-        let options = Options { max_range_m: Some(MAX_RANGE_M), ..Options::default() };
-        let world = World::new(Arc::new(scene), sensor, Air::default(), options);
-        Ok(Self { world, course, seed })
+        Ok(Self { world: trial_world(scene)?, course, seed })
     }
 
     fn truth(&self) -> Vec<Ends> {

@@ -1,23 +1,19 @@
 //! Explorations of random rooms by the next view, compared with other choices of the next stop.
 
-use std::{error::Error, fmt, sync::Arc};
+use std::{error::Error, fmt};
 
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64;
-use sonard_inverse::World;
-use sonard_model::{
-    acoustics::{Air, Sensor},
-    geometry::DVec2,
-    model::Options,
-};
+use sonard_model::geometry::DVec2;
 use sonard_survey::{
     NoObserver, survey,
     trial::{
         Comparison, Ends, Explorer, ExplorerSettings, RoomKind, Way, draw_trial, extent, generator,
+        trial_world,
     },
 };
 
-use super::{COMPLETE, MAX_RANGE_M, Settings};
+use super::{COMPLETE, Settings};
 
 /// Choice of the next stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -134,9 +130,7 @@ fn explore(
     settings: &Settings,
 ) -> Result<Vec<Step>, Box<dyn Error>> {
     let (room, course) = draw_trial(kind, FIRST_STOPS, &mut generator(kind, seed))?;
-    let sensor = Sensor::preset("senscomp-6500")?;
-    let options = Options { max_range_m: Some(MAX_RANGE_M), ..Options::default() };
-    let world = World::new(Arc::new(room), sensor, Air::default(), options);
+    let world = trial_world(room)?;
     let truth: Vec<Ends> = world.scene.walls.iter().map(|wall| [wall.a, wall.b]).collect();
     let Settings { beams, noise, odometry: odometry_per_m, .. } = *settings;
     let mut explorer = Explorer::new(&world, ExplorerSettings { beams, noise, odometry_per_m });

@@ -10,13 +10,11 @@ mod intervals;
 mod measure;
 mod sensor;
 
-use std::{error::Error, sync::Arc};
+use std::error::Error;
 
-use sonard_inverse::{ParameterGroup, World};
+use sonard_inverse::ParameterGroup;
 use sonard_model::{
-    acoustics::{Air, Sensor},
     geometry::{DVec2, Pose},
-    model::Options,
     scene::Scene,
 };
 use sonard_survey::{
@@ -24,7 +22,7 @@ use sonard_survey::{
     score_plan, survey,
     trial::{
         Comparison, Ends, ReadingNoise, RigidMotion, RoomKind, coverage, draw_place, draw_trial,
-        drift, generator, simulate_sweeps,
+        drift, generator, simulate_sweeps, trial_world,
     },
 };
 
@@ -87,7 +85,6 @@ struct Trial {
     seconds: f64,
 }
 
-const MAX_RANGE_M: f64 = 4.0;
 /// Number of places that the survey does not visit.
 const HELD_PLACES: usize = 8;
 /// Shares of covered length from which a plan is complete.
@@ -143,9 +140,7 @@ held | true room | score within 5 | wrong observed m | outer recall | recall of 
 fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn Error>> {
     let mut random = generator(kind, seed);
     let (room, poses) = draw_trial(kind, settings.stops, &mut random)?;
-    let sensor = Sensor::preset("senscomp-6500")?;
-    let options = Options { max_range_m: Some(MAX_RANGE_M), ..Options::default() };
-    let assumed = World::new(Arc::new(room), sensor, Air::default(), options);
+    let assumed = trial_world(room)?;
     let world = settings.truth.applied(&assumed)?;
     let odometry = drift(&poses, settings.odometry, &mut random);
     let mut readings =

@@ -3,7 +3,13 @@
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StudentT};
 use sonard_inverse::{FiringOutcome, FitSweep, SweepFiring, World, WorldError};
-use sonard_model::{geometry::Pose, model::Simulator, reading::PingStatus};
+use sonard_model::{
+    acoustics::{Air, Sensor, SensorError},
+    geometry::Pose,
+    model::{Options, Simulator},
+    reading::PingStatus,
+    scene::Scene,
+};
 use uuid::Uuid;
 
 use super::rooms::normal;
@@ -15,6 +21,18 @@ pub struct ReadingNoise {
     pub sigma_db: f64,
     /// Standard deviation of ranges, metres; one in fifty has a far tail.
     pub sigma_m: f64,
+}
+
+/// Maximum range of a trial's ranger, metres.
+const MAX_RANGE_M: f64 = 4.0;
+
+/// World of a trial: a scene with a SensComp 6500 that measures up to 4 m in usual air.
+///
+/// # Errors
+/// None with the shipped sensor.
+pub fn trial_world(scene: Scene) -> Result<World, SensorError> {
+    let options = Options { max_range_m: Some(MAX_RANGE_M), ..Options::default() };
+    Ok(World::new(scene.into(), Sensor::preset("senscomp-6500")?, Air::default(), options))
 }
 
 /// Thresholds at which sweeps are predicted, in standard deviations.
