@@ -1,4 +1,4 @@
-//! Tasks of the repository: releases, instruction counts, mutation tests, costs of builds.
+//! Tasks of the repository: releases, instruction counts, mutation tests, coverage, costs of builds.
 //!
 //! Each artefact of a release depends on the commit and on the pinned tools only: times are the commit's, paths
 //! of the building computer are replaced, archives are sorted. Two builds of a commit are equal
@@ -8,6 +8,7 @@ mod archive;
 mod binary;
 mod build_cost;
 mod command;
+mod coverage;
 mod deb;
 mod folders;
 mod instructions;
@@ -22,6 +23,7 @@ mod wheel;
 use std::{fs, process::ExitCode};
 
 use build_cost::CostOptions;
+use coverage::CoverageOptions;
 use instructions::InstructionOptions;
 use lexopt::{Parser, ValueExt as _};
 use mutants::MutantOptions;
@@ -32,11 +34,12 @@ use release::Release;
 pub(crate) type Failure = Box<dyn std::error::Error>;
 
 const HELP: &str = "\
-Usage: cargo xtask dist | instructions | mutants | build-cost
+Usage: cargo xtask dist | instructions | mutants | coverage | build-cost
 
   dist           build the artefacts of a release
   instructions   compare the instruction counts of fixed workloads
   mutants        find changes of the pure core that its unit tests do not notice
+  coverage       share of lines that the tests execute, by crate
   build-cost     measure builds of commits, and rebuilds after a changed line
 
 `cargo xtask TASK --help` lists the options of a task.";
@@ -68,6 +71,9 @@ fn run() -> Result<(), Failure> {
             perform(options, instructions::HELP, instructions::check)
         }
         "mutants" => perform(MutantOptions::parse(arguments)?, mutants::HELP, mutants::test),
+        "coverage" => {
+            perform(CoverageOptions::parse(arguments)?, coverage::HELP, coverage::measure)
+        }
         "build-cost" => {
             perform(CostOptions::parse(arguments)?, build_cost::HELP, build_cost::measure)
         }
