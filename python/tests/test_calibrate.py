@@ -17,13 +17,23 @@ TRUE_POSE = (0.80, 0.05, 92.0)
 BELIEVED = (0.774, 0.085, 90.0)
 
 
+def simulate(command: Command, path: Path, step_deg: float) -> Path:
+    pose = ",".join(map(str, TRUE_POSE))
+    air = ("--temperature-c", 15, "--max-range", 3)
+    command("simulate", "--scene", "simple-room", "--pose", pose, *air, "--step-deg", step_deg, "-o", path)
+    return path
+
+
 @pytest.fixture(scope="module")
 def log(command: Command, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Log of a sweep in warmer air and at another pose than the prior."""
-    path = tmp_path_factory.mktemp("calibrate") / "room.jsonl"
-    pose = ",".join(map(str, TRUE_POSE))
-    command("simulate", "--scene", "simple-room", "--pose", pose, "--temperature-c", 15, "--max-range", 3, "-o", path)
-    return path
+    """Log of a sweep in colder air and at another pose than the prior."""
+    return simulate(command, tmp_path_factory.mktemp("calibrate") / "room.jsonl", 0.9)
+
+
+@pytest.fixture(scope="module")
+def sparse_log(command: Command, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same with a quarter of the beams, for comparisons of several fits with the command."""
+    return simulate(command, tmp_path_factory.mktemp("calibrate") / "sparse.jsonl", 3.6)
 
 
 @pytest.fixture(scope="module")
@@ -90,9 +100,9 @@ def test_pickling(found: sonard.Calibration) -> None:
         found["gear"]
 
 
-def test_priors(log: Path, command: Command) -> None:
-    scans = sonard.read_log(log)
-    lines = command("calibrate", log, "--fit", "pose,materials,gear", "--prior", "gear=0.000001", "--prior", "x_m=0.03", "--json")
+def test_priors(sparse_log: Path, command: Command) -> None:
+    scans = sonard.read_log(sparse_log)
+    lines = command("calibrate", sparse_log, "--fit", "pose,materials,gear", "--prior", "gear=0.000001", "--prior", "x_m=0.03", "--json")
     found = sonard.calibrate(scans, fit=["pose", "materials", "gear"], priors={"gear": 1e-6, "x_m": 0.03})
     assert [as_line(estimate) for estimate in found.estimates] == lines
     assert not found["gear"].identified and abs(found.gear - 1) < 1e-5
@@ -101,11 +111,11 @@ def test_priors(log: Path, command: Command) -> None:
 
 @pytest.mark.parametrize("search", ["thorough", "furnished"])
 def test_searches_match_command(
-    log: Path, command: Command, search: Literal["thorough", "furnished"]
+    sparse_log: Path, command: Command, search: Literal["thorough", "furnished"]
 ) -> None:
-    scans = sonard.read_log(log)
+    scans = sonard.read_log(sparse_log)
     options = ("--fit", "pose", "--pose", ",".join(map(str, BELIEVED)), "--search", search, "--json")
-    lines = command("calibrate", log, *options)
+    lines = command("calibrate", sparse_log, *options)
     found = sonard.calibrate(scans, fit=["pose"], poses=[BELIEVED], search=search)
     assert [as_line(estimate) for estimate in found.estimates] == lines
 
