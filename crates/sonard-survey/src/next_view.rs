@@ -27,7 +27,8 @@ use overlap::ReadingOverlap;
 const MIN_OPEN_NATS: f64 = 0.1;
 /// Expected decrease of that entropy below which a place resolves nothing, nats.
 const MIN_GAIN_NATS: f64 = 0.02;
-/// Share of the largest gain from which the place nearest to the last stop is preferred.
+/// Share of the largest gain from which the place farthest from all stops is preferred: it resolves
+/// as much, and most of what no hypothesis contains.
 const NEAR_BEST: f64 = 0.97;
 /// Angle between predicted beams, degrees: half of an arc.
 const STEP_DEG: f64 = 3.6;
@@ -74,13 +75,16 @@ fn farthest_view(posed: &PosedPlan, judge: &Judge, options: &SurveyOptions) -> O
     }
     let walls = posed.plan.segments(&posed.walls);
     let free = FreeSpace { walls: &walls, posts: &posed.posts, poses: &posed.poses, judge };
-    let to_stops_m = |place: &DVec2| {
-        let distances_m = posed.poses.iter().map(|pose| pose.position().distance(*place));
-        distances_m.fold(f64::INFINITY, f64::min)
-    };
+    let to_stops_m = |place: &DVec2| distance_to_stops_m(*place, posed);
     let places = free.places(options.view_reach_m, MAX_SWEEPS).into_iter();
     let place = places.max_by(|a, b| to_stops_m(a).total_cmp(&to_stops_m(b)))?;
     pose_at(place, posed)
+}
+
+/// Distance of a place from the nearest stop, metres.
+fn distance_to_stops_m(place: DVec2, posed: &PosedPlan) -> f64 {
+    let distances_m = posed.poses.iter().map(|pose| pose.position().distance(place));
+    distances_m.fold(f64::INFINITY, f64::min)
 }
 
 /// Pose at a place with the heading of the nearest stop.
@@ -113,10 +117,10 @@ fn best_view(
         found.filter_map(|(place, terms)| Some((*place, terms.as_deref()?)))
     };
     let most_nats = views().map(|(_, terms)| gain_nats(terms)).fold(0.0, f64::max);
-    let last = posed.poses.last()?.position();
+    let to_stops_m = |place: DVec2| distance_to_stops_m(place, posed);
     let (place, terms) = views()
         .filter(|(_, terms)| gain_nats(terms) >= NEAR_BEST * most_nats)
-        .min_by(|a, b| a.0.distance(last).total_cmp(&b.0.distance(last)))
+        .max_by(|a, b| to_stops_m(a.0).total_cmp(&to_stops_m(b.0)))
         .filter(|_| most_nats > MIN_GAIN_NATS)?;
     Some(NextView {
         pose: pose_at(place, posed)?,
