@@ -8,19 +8,16 @@ pub(super) fn sentences(found: &Survey) -> (String, Vec<String>) {
     match &found.next_view {
         None if found.open_nats < 0.005 => ("none: nothing is open".to_owned(), Vec::new()),
         None => (format!("none: no reachable place resolves the {open} that are open"), Vec::new()),
-        Some(NextView { pose, resolves, .. })
-            if let [ResolvedPart { part: OpenPart::UnexplainedArcs { count }, .. }] =
-                resolves[..] =>
-        {
-            let at = place([pose.x_m, pose.y_m]);
-            let arcs = if count == 1 { "1 arc is".to_owned() } else { format!("{count} arcs are") };
-            let text = format!(
-                "a full turn at {at}, far from the stops: {arcs} unexplained by the plans found"
-            );
-            (text, Vec::new())
-        }
         Some(NextView { pose, gain_nats, resolves }) => {
             let at = place([pose.x_m, pose.y_m]);
+            if let [ResolvedPart { part: OpenPart::UnexplainedArcs { count }, .. }] = resolves[..] {
+                let arcs =
+                    if count == 1 { "1 arc is".to_owned() } else { format!("{count} arcs are") };
+                let text = format!(
+                    "a full turn at {at}, far from the stops: {arcs} unexplained by the plans found"
+                );
+                return (text, Vec::new());
+            }
             let text =
                 format!("a full turn at {at} resolves {gain_nats:.2} of {open} that are open");
             (text, resolves.iter().map(part).collect())
