@@ -21,7 +21,7 @@ use crate::{
 
 pub(crate) const HELP: &str = "\
 Run all tests on instrumented programs, and print the share of lines that they execute, by crate.
-Takes an hour on two cores, and 10 GB of disk. The playground is built first by web/build.sh; without
+Takes an hour on two cores, and 10 GB of disk. Build the playground before by web/build.sh: without
 it, its tests fail, and the report lacks what they execute.
 
 Usage: cargo xtask coverage [--report-only]

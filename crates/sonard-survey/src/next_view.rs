@@ -73,26 +73,37 @@ fn farthest_view(posed: &PosedPlan, judge: &Judge, options: &SurveyOptions) -> O
     if judge.workspace.observer.is_cancelled() {
         return None;
     }
-    let walls = posed.plan.segments(&posed.walls);
-    let free = FreeSpace { walls: &walls, posts: &posed.posts, poses: &posed.poses, judge };
     let to_stops_m = |place: &DVec2| distance_to_stops_m(*place, posed);
-    let places = free.places(options.view_reach_m, MAX_SWEEPS).into_iter();
+    let places = reachable_places(posed, judge, options.view_reach_m, MAX_SWEEPS).into_iter();
     let place = places.max_by(|a, b| to_stops_m(a).total_cmp(&to_stops_m(b)))?;
     pose_at(place, posed)
 }
 
+/// Places that are reachable in a plan within a distance of a stop, metres, at most `max_count`.
+fn reachable_places(
+    posed: &PosedPlan,
+    judge: &Judge,
+    reach_m: f64,
+    max_count: usize,
+) -> Vec<DVec2> {
+    let walls = posed.plan.segments(&posed.walls);
+    let free = FreeSpace { walls: &walls, posts: &posed.posts, poses: &posed.poses, judge };
+    free.places(reach_m, max_count)
+}
+
 /// Distance of a place from the nearest stop, metres.
 fn distance_to_stops_m(place: DVec2, posed: &PosedPlan) -> f64 {
-    let distances_m = posed.poses.iter().map(|pose| pose.position().distance(place));
-    distances_m.fold(f64::INFINITY, f64::min)
+    nearest_stop(place, posed).map_or(f64::INFINITY, |stop| stop.position().distance(place))
+}
+
+fn nearest_stop(place: DVec2, posed: &PosedPlan) -> Option<&Pose> {
+    let distance_m = |stop: &Pose| stop.position().distance(place);
+    posed.poses.iter().min_by(|a, b| distance_m(a).total_cmp(&distance_m(b)))
 }
 
 /// Pose at a place with the heading of the nearest stop.
 fn pose_at(place: DVec2, posed: &PosedPlan) -> Option<Pose> {
-    let nearest = |a: &&Pose, b: &&Pose| {
-        a.position().distance(place).total_cmp(&b.position().distance(place))
-    };
-    let heading_deg = posed.poses.iter().min_by(nearest)?.heading_deg;
+    let heading_deg = nearest_stop(place, posed)?.heading_deg;
     Some(Pose { x_m: place.x, y_m: place.y, heading_deg })
 }
 
@@ -102,9 +113,8 @@ fn best_view(
     judge: &Judge,
     options: &SurveyOptions,
 ) -> Option<NextView> {
-    let walls = posed.plan.segments(&posed.walls);
-    let free = FreeSpace { walls: &walls, posts: &posed.posts, poses: &posed.poses, judge };
-    let places = free.places(options.view_reach_m, MAX_SWEEPS / forecast.simulators.len().max(1));
+    let max_count = MAX_SWEEPS / forecast.simulators.len().max(1);
+    let places = reachable_places(posed, judge, options.view_reach_m, max_count);
     let is_cancelled = || judge.workspace.observer.is_cancelled();
     let expected = |place: &DVec2| forecast.terms_at(*place).filter(|_| !is_cancelled());
     let all: Vec<Option<Vec<f64>>> = places.par_iter().map(expected).collect();
