@@ -311,7 +311,7 @@ fn survey_error(py: Python<'_>, sweeps: &[FitSweep], error: &SurveyError) -> PyE
         SurveyError::World(_) | SurveyError::Scene(_) => {
             (error.to_string(), "check sensor, air and max_range_m")
         }
-        SurveyError::Group(_) | SurveyError::NotFittable { .. } => {
+        SurveyError::Group(_) | SurveyError::NotFittable { .. } | SurveyError::FitOfArray => {
             (error.to_string(), "poses, walls and posts are estimated in any case")
         }
     };

@@ -22,11 +22,14 @@ use super::{
     what_if::{AssumptionFilter, InsteadArgs, WhatIf},
 };
 use crate::{
-    inverse::{FitSweep, ParameterGroup, World},
-    scan::{Provenance, Session, text::format_count},
+    geometry::{DVec2, Pose, wrap_180, wrap_360},
+    inverse::{
+        ArrayFiring, ArrayRound, FitSweep, FitSweepError, ParameterGroup, SweepFiring, World,
+    },
+    scan::{Provenance, ScanView, Session, text::format_count},
     survey::{
-        OdometrySigma, PlanScores, SearchEnd, Survey, SurveyError, SurveyObserver, SurveyOptions,
-        SurveyProgress, SurveyStage, resume_survey, unknown_room,
+        OdometrySigma, PlanScores, SearchEnd, Survey, SurveyError, SurveyInput, SurveyObserver,
+        SurveyOptions, SurveyProgress, SurveyStage, resume_survey, unknown_room,
     },
 };
 
@@ -34,7 +37,8 @@ use crate::{
 #[derive(Debug, clap::Args)]
 #[command(after_help = HELP)]
 pub(super) struct Args {
-    /// Logs of sweeps in the order of the course, or folders of logs; - for standard input
+    /// Logs of sweeps, or of an array on a moving robot, in the order of the course, or folders of
+    /// logs; - for standard input
     #[arg(required = true, value_name = "LOG")]
     logs: Vec<PathBuf>,
     /// Output folder; scene, poses, walls with their status, report, picture
@@ -74,6 +78,10 @@ pub(super) struct Args {
     #[arg(long, value_name = "M", default_value_t = SurveyOptions::default().view_reach_m,
           value_parser = within(0.0..=20.0))]
     view_reach: f64,
+    /// Minimum distance between rounds of an array that are used, metres, unless the robot turns by
+    /// 5 degrees
+    #[arg(long, value_name = "M", default_value_t = 0.1, value_parser = within(0.0..=5.0))]
+    round_spacing: f64,
     /// Budget of the search: maximum number of floor plans whose readings are predicted
     #[arg(long, value_name = "N", default_value_t = SurveyOptions::default().max_scenes,
           value_parser = parse_count)]
@@ -126,11 +134,93 @@ Examples:
 Exit codes: 0 done, 1 ended early (interrupted, or the budget is spent), 2 wrong usage or input, \
 3 write error.";
 
-/// Sweeps of the logs and what they share.
+/// Readings of the logs and what they share.
 struct Input {
-    sweeps: Vec<FitSweep>,
+    course: Course,
     world: World,
     provenances: Vec<Provenance>,
+}
+
+/// Readings in the order of the course.
+#[derive(Debug)]
+enum Course {
+    Sweeps(Vec<FitSweep>),
+    Rounds(Vec<ArrayRound>),
+}
+
+impl Course {
+    /// Readings of a scan: a sweep of a ranger on a stepper, or the rounds of an array.
+    fn from_scan(scan: &ScanView) -> Result<Self, FitSweepError> {
+        match FitSweep::from_scan(scan) {
+            Err(FitSweepError::OfArray(_)) => ArrayRound::from_scan(scan).map(Self::Rounds),
+            sweep => sweep.map(|sweep| Self::Sweeps(vec![sweep])),
+        }
+    }
+
+    /// Appends readings of the same kind; `None` for those of the other.
+    fn extend(&mut self, more: Self) -> Option<()> {
+        match (self, more) {
+            (Self::Sweeps(sweeps), Self::Sweeps(more)) => sweeps.extend(more),
+            (Self::Rounds(rounds), Self::Rounds(more)) => rounds.extend(more),
+            _ => return None,
+        }
+        Some(())
+    }
+
+    /// Drops rounds that begin nearer than `spacing_m` and at less than 5 degrees from the last one
+    /// kept.
+    fn thin(&mut self, spacing_m: f64) {
+        const TURN_DEG: f64 = 5.0;
+        let Self::Rounds(rounds) = self else { return };
+        let mut last: Option<Pose> = None;
+        rounds.retain(|round| {
+            let is_kept = last.is_none_or(|last| {
+                last.position().distance(round.pose.position()) >= spacing_m
+                    || wrap_180(last.heading_deg - round.pose.heading_deg).abs() >= TURN_DEG
+            });
+            last = if is_kept { Some(round.pose) } else { last };
+            is_kept
+        });
+    }
+
+    fn count(&self) -> String {
+        match self {
+            Self::Sweeps(sweeps) => format_count(sweeps.len(), "sweep"),
+            Self::Rounds(rounds) => format_count(rounds.len(), "round"),
+        }
+    }
+
+    fn input(&self) -> SurveyInput<'_> {
+        match self {
+            Self::Sweeps(sweeps) => sweeps.into(),
+            Self::Rounds(rounds) => rounds.into(),
+        }
+    }
+
+    /// Echoes of each sweep or round, in the order of the azimuths: position of the transducer in
+    /// the frame of the pose, azimuth in degrees, and range in metres unless there was no echo.
+    fn beams(&self, sound_speed_m_s: f64) -> Vec<Vec<(DVec2, f64, Option<f64>)>> {
+        let of_sweep = |sweep: &FitSweep| {
+            let beam =
+                |beam: &SweepFiring| (DVec2::ZERO, beam.azimuth_deg, beam.range_m(sound_speed_m_s));
+            sweep.beams.iter().map(beam).collect()
+        };
+        let of_round = |round: &ArrayRound| {
+            let beam = |firing: &ArrayFiring| {
+                let range_m = firing.outcome.range_m(sound_speed_m_s);
+                (firing.position, firing.azimuth_deg, range_m)
+            };
+            round.firings.iter().map(beam).collect()
+        };
+        let mut all: Vec<Vec<_>> = match self {
+            Self::Sweeps(sweeps) => sweeps.iter().map(of_sweep).collect(),
+            Self::Rounds(rounds) => rounds.iter().map(of_round).collect(),
+        };
+        for beams in &mut all {
+            beams.sort_by(|a: &(_, f64, _), b| wrap_360(a.1).total_cmp(&wrap_360(b.1)));
+        }
+        all
+    }
 }
 
 pub(super) fn run(args: &Args) -> Outcome {
@@ -207,8 +297,8 @@ fn read(args: &Args, what_if: &WhatIf) -> Result<Input, Failure> {
     for log in &logs_in(&args.logs)? {
         for_each_scan(log, |mut scan| {
             assumptions.apply(&mut scan);
-            let sweep = match FitSweep::from_scan(&scan) {
-                Ok(sweep) => sweep,
+            let found = match Course::from_scan(&scan) {
+                Ok(found) => found,
                 Err(error) => {
                     notice!("warning: {}: {error}; scan skipped", log.display());
                     return Ok(());
@@ -223,7 +313,7 @@ fn read(args: &Args, what_if: &WhatIf) -> Result<Input, Failure> {
                     let world = unknown_room(sensor, air, options, args.max_range);
                     let world = world.map_err(|error| failure_from(&error))?;
                     let provenances = vec![session.provenance];
-                    input = Some((session, Input { sweeps: vec![sweep], world, provenances }));
+                    input = Some((session, Input { course: found, world, provenances }));
                 }
                 Some((first, input)) => {
                     if first.sensor != session.sensor {
@@ -235,18 +325,39 @@ fn read(args: &Args, what_if: &WhatIf) -> Result<Input, Failure> {
                             "survey scans of one sensor together, or override it with --sensor",
                         ));
                     }
-                    input.sweeps.push(sweep);
+                    input.course.extend(found).ok_or_else(|| {
+                        Failure::input(
+                            format!(
+                                "{}: scans of an array and of a ranger on a stepper",
+                                log.display()
+                            ),
+                            "survey them separately",
+                        )
+                    })?;
                     input.provenances.push(session.provenance);
                 }
             }
             Ok(())
         })?;
     }
-    let input = input.map(|(_, input)| input);
-    input.ok_or_else(|| {
-        Failure::input("there is no sweep to survey", "give logs of a ranger on a stepper")
-    })
+    let Some((_, mut input)) = input else {
+        return Err(Failure::input(
+            "there is no sweep to survey",
+            "give logs of a ranger on a stepper, or of an array on a moving robot",
+        ));
+    };
+    input.course.thin(args.round_spacing);
+    match &input.course {
+        Course::Rounds(rounds) if rounds.len() > MAX_ROUNDS => Err(Failure::input(
+            format!("{} rounds of the array: a survey takes {MAX_ROUNDS} at most", rounds.len()),
+            "give a shorter course, or a larger --round-spacing",
+        )),
+        _ => Ok(input),
+    }
 }
+
+/// Maximum number of rounds of an array: the time of a survey is proportional to it.
+const MAX_ROUNDS: usize = 200;
 
 /// Surveys until done or interrupted.
 fn find(args: &Args, input: &Input, scores: &PlanScores) -> Result<Survey, Failure> {
@@ -255,10 +366,10 @@ fn find(args: &Args, input: &Input, scores: &PlanScores) -> Result<Survey, Failu
         let _within = runtime.enter();
         Interrupts::listen()
     };
-    let sweeps = format_count(input.sweeps.len(), "sweep");
-    let bar = progress::spinner(&format!("survey of {sweeps}:"));
+    let bar = progress::spinner(&format!("survey of {}:", input.course.count()));
     let observer = Observer { bar: bar.clone(), interrupts };
-    let found = resume_survey(&input.world, &input.sweeps, &args.options(), scores, &observer);
+    let found =
+        resume_survey(&input.world, input.course.input(), &args.options(), scores, &observer);
     bar.finish_and_clear();
     found.map_err(|error| failure_from(&error))
 }
@@ -271,6 +382,7 @@ fn failure_from(error: &SurveyError) -> Failure {
             "check sensor and air of the logs, and the options"
         }
         SurveyError::Group(error) => return Failure::input(error, error.help()),
+        SurveyError::FitOfArray => "leave out --fit",
         SurveyError::NotFittable { .. } => "poses, walls and posts are estimated in any case",
     };
     Failure::input(error, help)

@@ -11,6 +11,7 @@
 //! none was strong enough, and the ends of arcs carry as much information as their ranges
 //! (`likelihood`).
 
+mod array_round;
 mod bearing;
 mod candidates;
 mod coarse_grid;
@@ -36,6 +37,7 @@ mod time_walk;
 mod walls;
 mod world;
 
+pub use array_round::{ArrayFiring, ArrayRound};
 pub use coarse_grid::{CoarseGrid, CoarseGridError};
 pub use course::{Odometry, Tracker};
 pub use diagnosis::{Misfit, diagnose};

@@ -1,7 +1,7 @@
 //! Readings of one scan, prepared for fits.
 
 use sonard_model::geometry::Pose;
-use sonard_records::{PingStatus, ScanView};
+use sonard_records::{Ping, PingStatus, ScanView};
 use thiserror::Error;
 use uuid::Uuid;
 
@@ -52,6 +52,20 @@ pub enum FiringOutcome {
 }
 
 impl FiringOutcome {
+    /// Outcome of a logged reading; `None` for one without a valid outcome. `tof_us_per_m` is the
+    /// time of flight per metre of range.
+    pub(crate) fn of_ping(ping: &Ping, tof_us_per_m: f64) -> Option<Self> {
+        match ping.status {
+            PingStatus::Echo => {
+                let of_range = || ping.range_m.map(|range_m| range_m * tof_us_per_m);
+                Some(Self::Echo { tof_us: ping.tof_us.or_else(of_range)? })
+            }
+            PingStatus::NoEcho => Some(Self::NoEcho),
+            PingStatus::MinRange => Some(Self::BelowMinRange),
+            PingStatus::LinkLost | PingStatus::StepUncertain | PingStatus::ModuleFault => None,
+        }
+    }
+
     /// Range of an echo for a speed of sound, metres.
     #[must_use]
     pub fn range_m(&self, sound_speed_m_s: f64) -> Option<f64> {
@@ -103,6 +117,9 @@ pub enum FitSweepError {
     /// Scan of an array.
     #[error("scan {0} is of an array: only sweeps of one ranger on a stepper can be used")]
     OfArray(Uuid),
+    /// Scan of a ranger on a stepper.
+    #[error("scan {0} is of a ranger on a stepper, not of an array")]
+    NotOfArray(Uuid),
     /// Robot moved during the scan.
     #[error("scan {0}: the ranger was moved during the scan")]
     Moved(Uuid),
@@ -142,17 +159,7 @@ impl FitSweep {
             .pings
             .iter()
             .filter_map(|ping| {
-                let outcome = match ping.status {
-                    PingStatus::Echo => {
-                        let of_range = || ping.range_m.map(|range_m| range_m * tof_us_per_m);
-                        FiringOutcome::Echo { tof_us: ping.tof_us.or_else(of_range)? }
-                    }
-                    PingStatus::NoEcho => FiringOutcome::NoEcho,
-                    PingStatus::MinRange => FiringOutcome::BelowMinRange,
-                    PingStatus::LinkLost | PingStatus::StepUncertain | PingStatus::ModuleFault => {
-                        return None;
-                    }
-                };
+                let outcome = FiringOutcome::of_ping(ping, tof_us_per_m)?;
                 Some(SweepFiring { azimuth_deg: ping.azimuth_deg, outcome })
             })
             .collect();

@@ -1,6 +1,6 @@
 //! Arcs: neighbouring beams of a sweep with one range.
 
-use sonard_model::geometry::{wrap_180, wrap_360};
+use sonard_model::geometry::{DVec2, Pose, wrap_180, wrap_360};
 
 use crate::{
     range_errors::RangeErrors,
@@ -21,6 +21,8 @@ const RANGE_QUANTILE: f64 = 0.3;
 pub(crate) struct Arc {
     /// Index of the sweep.
     pub(crate) sweep: usize,
+    /// Position of the transducer in the frame of the pose, metres: the mean over the beams.
+    pub(crate) face: DVec2,
     /// Azimuth of the middle, degrees.
     pub(crate) azimuth_deg: f64,
     /// Range, metres.
@@ -29,15 +31,44 @@ pub(crate) struct Arc {
     pub(crate) is_cut: bool,
     /// Indices of the beams in the sweep.
     pub(crate) beams: Vec<usize>,
+    /// Angle between neighbouring beams, degrees.
+    pub(crate) step_deg: f64,
     /// Errors of the ranger.
     pub(crate) errors: RangeErrors,
 }
 
 impl Arc {
+    /// Position of the transducer, metres.
+    pub(crate) fn place(&self, pose: &Pose) -> DVec2 {
+        pose.position() + self.face_of(pose)
+    }
+
+    /// Position of the transducer from that of the pose, along the axes of the world, metres.
+    pub(crate) fn face_of(&self, pose: &Pose) -> DVec2 {
+        DVec2::from_angle(pose.heading_deg.to_radians()).rotate(self.face)
+    }
+
+    /// Point at a range along the middle, metres.
+    pub(crate) fn point_at(&self, pose: &Pose, range_m: f64) -> DVec2 {
+        self.place(pose) + range_m * DVec2::from_angle(pose.direction_rad(self.azimuth_deg))
+    }
+
     /// Standard deviation of the azimuth, degrees.
     pub(crate) fn sigma_deg(&self) -> f64 {
-        self.errors.bearing_factor() * if self.is_cut { 4.0 } else { 0.8 }
+        let base_deg = if self.is_cut { 4.0 } else { 0.8 };
+        self.errors.bearing_factor() * blurred(base_deg, self.step_deg)
     }
+}
+
+/// Standard deviation of the azimuth of an arc's middle, with that by the beams in between: each
+/// end of the arc is anywhere between two beams. All in degrees.
+pub(crate) fn blurred(sigma_deg: f64, step_deg: f64) -> f64 {
+    sigma_deg.hypot(step_deg / 24_f64.sqrt())
+}
+
+fn mean(points: impl ExactSizeIterator<Item = DVec2>) -> DVec2 {
+    let count = points.len().max(1) as f64;
+    points.sum::<DVec2>() / count
 }
 
 /// Run of beams, before lobes are joined.
@@ -71,10 +102,12 @@ pub(crate) fn find_arcs(sweep: usize, readings: &Readings, errors: RangeErrors) 
     }
     let arc = |run: Run| Arc {
         sweep,
+        face: mean(run.beams.iter().map(|at| readings.beams[*at].face)),
         azimuth_deg: wrap_180(run.first_deg + 0.5 * run.extent_deg),
         range_m: run.range_m,
         is_cut: run.is_cut.contains(&true),
         beams: run.beams,
+        step_deg: readings.step_deg,
         errors,
     };
     runs.into_iter().map(arc).collect()

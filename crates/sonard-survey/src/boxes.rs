@@ -73,7 +73,7 @@ fn faces(posed: &PosedPlan, walls: &[Segment], left: &[&Arc]) -> Vec<BoxShape> {
     arcs.sort_by_key(|arc| std::cmp::Reverse(arc.beams.len()));
     let of_arcs = arcs.into_iter().map(|arc| {
         let pose = &posed.poses[arc.sweep];
-        let foot = pose.point_at(arc.azimuth_deg, arc.range_m);
+        let foot = arc.point_at(pose, arc.range_m);
         let face = Line::through(pose.direction_rad(arc.azimuth_deg), foot);
         let along_m = face.along_m(foot);
         BoxShape { face, from_m: along_m - SEED_HALF_M, to_m: along_m + SEED_HALF_M, depth_m: 0.0 }

@@ -98,11 +98,14 @@ fn add_arc(
     arc: &Arc,
     pose: &Pose,
 ) {
-    let (range_m, bearing_rad) = feature.predict(pose.position());
-    let rates = feature.derivatives(pose.position());
+    let place = arc.place(pose);
+    let (range_m, bearing_rad) = feature.predict(place);
+    let rates = feature.derivatives(place);
+    let place_by_turn = arc.face_of(pose).perp();
     let row = |by_feature: [f64; 2], by_place: DVec2, by_turn: f64| {
         let mut row = vec![(columns[0], by_feature[0]), (columns[1], by_feature[1])];
         if let Some(at) = of_pose {
+            let by_turn = by_turn + by_place.dot(place_by_turn);
             row.extend([(at, by_place.x), (at + 1, by_place.y), (at + 2, by_turn)]);
         }
         row

@@ -111,7 +111,7 @@ impl CandidateSources<'_> {
 
     /// Places of unexplained arcs.
     fn lone_points(&self) -> Vec<DVec2> {
-        let place = |arc: &&Arc| self.poses[arc.sweep].point_at(arc.azimuth_deg, arc.range_m);
+        let place = |arc: &&Arc| arc.point_at(&self.poses[arc.sweep], arc.range_m);
         self.left.unwrap_or_default().iter().map(place).collect()
     }
 

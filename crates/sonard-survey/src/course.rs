@@ -31,7 +31,7 @@ pub fn map_course(
     options: &SurveyOptions,
 ) -> Result<CourseMap, SurveyError> {
     let scores = PlanScores::default();
-    let workspace = workspace(world, sweeps, options, (&NoObserver, &scores))?;
+    let workspace = workspace(world, (sweeps.into(), sweeps), options, (&NoObserver, &scores))?;
     let map = virtual_map(&workspace.arcs, workspace.readings[0].odometry, &workspace.moves);
     let sigma = |at: usize| match (pose_column(at), &map.covariance) {
         (None, _) => Some([0.0; 3]),

@@ -30,6 +30,9 @@ pub enum SurveyError {
         /// Groups that can be fitted.
         fittable: &'static [ParameterGroup],
     },
+    /// Group of numbers to fit for an array.
+    #[error("numbers of the ranger can't be fitted to rounds of an array")]
+    FitOfArray,
     /// Invalid assumption.
     #[error("{name} is {value}: it must be {expected}")]
     Option {

@@ -83,7 +83,7 @@ impl VirtualFeature {
     /// Line and point that one arc suggests: both explain it, and a second place decides.
     pub(crate) fn of_arc(arc: &Arc, pose: &Pose) -> [Self; 2] {
         let normal_rad = pose.direction_rad(arc.azimuth_deg);
-        let position = pose.point_at(arc.azimuth_deg, arc.range_m);
+        let position = arc.point_at(pose, arc.range_m);
         [Self::line(normal_rad, position.dot(DVec2::from_angle(normal_rad))), Self::point(position)]
     }
 

@@ -9,8 +9,8 @@ use std::{
 };
 
 use sonard_model::{
-    geometry::{Pose, wrap_180, wrap_360},
-    model::{Prediction, Simulator},
+    geometry::{DVec2, Pose, wrap_180, wrap_360},
+    model::{Arrival, Prediction, Simulator},
     reading::PingStatus,
     scene::{Cylinder, Material, Scene, Wall},
 };
@@ -332,7 +332,30 @@ fn scene_of(template: &Scene, segments: &[Segment], posts: &[PostShape]) -> Scen
 fn predict(simulator: &Simulator, readings: &Readings, pose: &Pose) -> Option<Vec<Prediction>> {
     let point = simulator.at(pose.position());
     let beams = readings.beams.iter();
-    beams.map(|beam| point.ping(pose.direction_rad(beam.azimuth_deg)).ok()).collect()
+    let of_beam = |beam: &Beam| {
+        let prediction = point.ping(pose.direction_rad(beam.azimuth_deg)).ok()?;
+        Some(at_face(prediction, beam, pose))
+    };
+    beams.map(of_beam).collect()
+}
+
+/// Prediction for a transducer off the axis: to the first order of its offset, the paths are those
+/// from the axis, longer or shorter by the offset's part along them. For echoes of plane walls that
+/// is exact.
+fn at_face(mut prediction: Prediction, beam: &Beam, pose: &Pose) -> Prediction {
+    if beam.face != DVec2::ZERO
+        && let (Some(range_m), Some(arrival)) = (&mut prediction.range_m, &prediction.arrival)
+    {
+        let face = DVec2::from_angle(pose.heading_deg.to_radians()).rotate(beam.face);
+        *range_m -= face.dot(mean_direction(arrival));
+    }
+    prediction
+}
+
+/// Mean of the directions in which an echo leaves and from which it returns: minus the derivative of
+/// its range by the place.
+pub(crate) fn mean_direction(arrival: &Arrival) -> DVec2 {
+    0.5 * (DVec2::from_angle(arrival.departure_rad) + DVec2::from_angle(arrival.arrival_rad))
 }
 
 /// Predicted outcomes in all directions from a place, in steps of [`DIRECTION_STEP_DEG`].

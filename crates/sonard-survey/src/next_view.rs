@@ -44,7 +44,7 @@ const MIN_SHARE: f64 = 0.02;
 /// probabilities are by their scores, for gaps by the likelihood. Where no place decides among them
 /// but arcs are unexplained, none of them is right, and the view is the place farthest from all
 /// stops. The result is independent of the number of threads; it has no view if nothing is open, no
-/// place resolves anything, or the observer cancelled.
+/// place resolves anything, the readings are those of an array, or the observer cancelled.
 pub(crate) fn find_next_view(
     posed: &PosedPlan,
     judge: &Judge,
@@ -55,6 +55,9 @@ pub(crate) fn find_next_view(
     let hypotheses = hypotheses(posed, judge, assessment, posts);
     let weights = Weights::of(&hypotheses);
     let open_nats = weights.entropy_nats();
+    if judge.workspace.is_array {
+        return (open_nats, None);
+    }
     let is_open = open_nats > MIN_OPEN_NATS;
     let forecast = is_open.then(|| Forecast::new(judge, &hypotheses, &weights, options)).flatten();
     let view = forecast.and_then(|forecast| best_view(&forecast, posed, judge, options));

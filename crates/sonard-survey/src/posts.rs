@@ -141,7 +141,7 @@ fn candidates(posed: &PosedPlan, kind: PostKind, left: &[&Arc]) -> Vec<PostShape
     let seed = |arc: &&Arc| {
         let pose = &posed.poses[arc.sweep];
         let radius_m = RADIUS_PRIOR_M[0];
-        let center = pose.point_at(arc.azimuth_deg, arc.range_m + radius_m);
+        let center = arc.point_at(pose, arc.range_m + radius_m);
         fitted(PostShape { center, radius_m }, left, &posed.poses)
     };
     let mut found: Vec<FittedPost> = left.iter().filter_map(seed).collect();
@@ -181,7 +181,7 @@ fn fitted(seed: PostShape, left: &[&Arc], poses: &[Pose]) -> Option<FittedPost> 
         let mut normal = NormalEquations::new(3);
         for arc in &own {
             let pose = &poses[arc.sweep];
-            let to = post.center - pose.position();
+            let to = post.center - arc.place(pose);
             let distance_m = to.length().max(1e-6);
             let axis = to / distance_m;
             let off_m = arc.range_m - (distance_m - post.radius_m);
@@ -235,7 +235,7 @@ fn score_of(post: &PostShape, posed: &PosedPlan, judge: &Judge) -> Option<f64> {
 /// Returns `true` if range and middle of an arc agree with an echo from the surface.
 fn agrees(post: &PostShape, arc: &Arc, poses: &[Pose], gate_m: f64) -> bool {
     let pose = &poses[arc.sweep];
-    let to = post.center - pose.position();
+    let to = post.center - arc.place(pose);
     let off_m = arc.range_m - (to.length() - post.radius_m);
     let off_rad = wrap_pi(pose.direction_rad(arc.azimuth_deg) - to.to_angle());
     off_m.abs() < arc.errors.gate_m(gate_m) && off_rad.abs() < GATE_RAD[usize::from(arc.is_cut)]

@@ -1,7 +1,7 @@
 //! Readings of a sweep at the world's speed of sound, in order of azimuth.
 
 use sonard_inverse::{FiringOutcome, FitSweep, World};
-use sonard_model::geometry::{Pose, wrap_360};
+use sonard_model::geometry::{DVec2, Pose, wrap_360};
 
 use crate::options::SurveyOptions;
 
@@ -21,6 +21,8 @@ pub(crate) enum Outcome {
 pub(crate) struct Beam {
     /// Azimuth, degrees in [0, 360).
     pub(crate) azimuth_deg: f64,
+    /// Position of the transducer in the frame of the pose, metres; zero on the axis.
+    pub(crate) face: DVec2,
     pub(crate) outcome: Outcome,
 }
 
@@ -39,9 +41,10 @@ pub(crate) struct Readings {
 }
 
 impl Readings {
-    /// Readings of a sweep; an echo beyond the maximum range of the model counts as none.
+    /// Readings of a sweep, with the positions of the transducers of an array in the order of its
+    /// beams; an echo beyond the maximum range of the model counts as none.
     pub(crate) fn new(
-        sweep: &FitSweep,
+        (sweep, faces): (&FitSweep, Option<&[DVec2]>),
         world: &World,
         max_range_m: f64,
         options: &SurveyOptions,
@@ -59,7 +62,9 @@ impl Readings {
         let mut beams: Vec<Beam> = sweep
             .beams
             .iter()
-            .map(|beam| Beam {
+            .enumerate()
+            .map(|(at, beam)| Beam {
+                face: faces.map_or(DVec2::ZERO, |faces| faces[at]),
                 azimuth_deg: wrap_360(world.heading_zero_deg + world.gear * beam.azimuth_deg),
                 outcome: outcome(beam.outcome),
             })

@@ -19,6 +19,10 @@ const MAX_LOST: f64 = 0.5;
 /// a better one.
 pub(crate) fn relocated(posed: &PosedPlan, judge: &Judge) -> Option<Vec<Pose>> {
     let workspace = judge.workspace;
+    if workspace.is_array {
+        // Odometry leaves few sweeps of a moving array lost, and `locate` takes those of a stepper.
+        return None;
+    }
     let segments = posed.plan.segments(&posed.walls);
     let (simulator, predictions) = judge.predictions(&segments)?;
     let left = unexplained(workspace, &predictions);

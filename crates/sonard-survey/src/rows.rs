@@ -7,9 +7,10 @@ use sonard_model::{
 };
 
 use crate::{
-    arc::{Arc, quantile},
+    arc::{Arc, blurred, quantile},
     arrangement::{LineArrangement, Run},
     feature::VirtualFeature,
+    judge::mean_direction,
     normal::{NormalEquations, pose_column},
     posed::{LineColumns, PosedPlan},
     range_errors::RangeErrors,
@@ -68,25 +69,47 @@ impl<'a> RowBuilder<'a> {
             return;
         }
         let sigma_m = self.errors.sigma_m(SIGMA_M[usize::from(errors_m.len() <= FEW_BEAMS)]);
-        normal.add(&self.range_row(path, arc.sweep), median(errors_m), sigma_m, ROBUST);
+        normal.add(&self.range_row(explained, path), median(errors_m), sigma_m, ROBUST);
+        let Some((off_rad, sigma_rad)) = self.bearing_error(explained, predicted, gate_m) else {
+            return;
+        };
+        normal.add(&self.bearing_row(path, arc.sweep), off_rad, sigma_rad, ROBUST);
+    }
+
+    /// Measured minus predicted bearing of an arc, and its standard deviation, radians.
+    ///
+    /// That of a single beam is known within the step between beams; that of several is the middle
+    /// of the arc, compared with that of the predicted arc.
+    fn bearing_error(
+        &self,
+        explained: &ExplainedArc,
+        predicted: &[Arc],
+        gate_m: f64,
+    ) -> Option<(f64, f64)> {
+        let arc = explained.arc;
+        if arc.beams.len() == 1 {
+            let pose = &self.posed.poses[arc.sweep];
+            let arrival = explained.prediction.arrival.as_ref()?;
+            let from_rad = mean_direction(arrival).to_angle();
+            let off_rad = wrap_pi(pose.direction_rad(arc.azimuth_deg) - from_rad);
+            return Some((off_rad, (arc.step_deg / 12_f64.sqrt()).to_radians()));
+        }
         let off_deg = |other: &&Arc| wrap_180(other.azimuth_deg - arc.azimuth_deg).abs();
         let same = predicted
             .iter()
             .filter(|other| (other.range_m - arc.range_m).abs() < gate_m && off_deg(other) < 4.0)
-            .min_by(|a, b| off_deg(a).total_cmp(&off_deg(b)));
-        if let Some(same) = same {
-            let is_cut = arc.is_cut || same.is_cut;
-            let sigma_deg =
-                SIGMA_DEG * self.errors.bearing_factor() * if is_cut { CUT_SIGMA } else { 1.0 };
-            let off_rad = wrap_180(arc.azimuth_deg - same.azimuth_deg).to_radians();
-            let row = self.bearing_row(path, arc.sweep);
-            normal.add(&row, off_rad, sigma_deg.to_radians(), ROBUST);
-        }
+            .min_by(|a, b| off_deg(a).total_cmp(&off_deg(b)))?;
+        let sigma_deg = SIGMA_DEG * if arc.is_cut || same.is_cut { CUT_SIGMA } else { 1.0 };
+        let sigma_deg = self.errors.bearing_factor() * blurred(sigma_deg, arc.step_deg);
+        let off_rad = wrap_180(arc.azimuth_deg - same.azimuth_deg).to_radians();
+        Some((off_rad, sigma_deg.to_radians()))
     }
 
     /// Derivatives of the range of a path.
-    fn range_row(&self, path: &Path, sweep: usize) -> Vec<(usize, f64)> {
-        let place = self.posed.poses[sweep].position();
+    fn range_row(&self, explained: &ExplainedArc, path: &Path) -> Vec<(usize, f64)> {
+        let arc = explained.arc;
+        let (sweep, pose) = (arc.sweep, &self.posed.poses[arc.sweep]);
+        let place = pose.position();
         let rate = |motion: &SceneMotion| {
             let scene = self.simulator.scene();
             0.5 * length_derivative(path, [place; 2], 0.0, scene, motion)
@@ -95,6 +118,11 @@ impl<'a> RowBuilder<'a> {
         if let Some(at) = pose_column(sweep) {
             for (offset, axis) in [DVec2::X, DVec2::Y].into_iter().enumerate() {
                 row.push((at + offset, rate(&SceneMotion::for_transducer(axis))));
+            }
+            if arc.face != DVec2::ZERO
+                && let Some(arrival) = &explained.prediction.arrival
+            {
+                row.push((at + 2, -arc.face_of(pose).perp().dot(mean_direction(arrival))));
             }
         }
         let lines = self.motions.iter().map(|(at, motion)| (*at, rate(motion)));

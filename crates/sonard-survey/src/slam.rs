@@ -2,10 +2,10 @@
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
-use sonard_model::geometry::{Pose, wrap_180, wrap_pi};
+use sonard_model::geometry::{DVec2, Pose, wrap_180, wrap_pi};
 
 use crate::{
-    arc::Arc,
+    arc::{Arc, blurred},
     bundle::{Bundle, SIGMA_M, SupportedFeature, fit_feature},
     feature::{FeatureKind, VirtualFeature},
     odometry::{Move, in_frame_of_first},
@@ -17,6 +17,8 @@ const GATE_M: [f64; 2] = [0.03, 0.015];
 /// Maximum difference of directions, degrees; more for a cut arc.
 const GATE_DEG: f64 = 5.0;
 const CUT_GATE: f64 = 1.8;
+/// Standard deviations by the step between beams that the difference of directions includes.
+const GATE_STEPS: f64 = 2.5;
 /// Evidence of an arc that a feature explains, compared with chance, nats.
 const EVIDENCE: f64 = 9.0;
 /// Reach of the search for the next pose, standard deviations of odometry.
@@ -185,11 +187,12 @@ fn associate<'a>(
 
 /// Squared distance of an arc from a feature, in standard deviations; `None` outside the gate.
 fn mismatch(feature: &VirtualFeature, arc: &Arc, pose: &Pose, gate_m: f64) -> Option<f64> {
-    let (range_m, bearing_rad) = feature.predict(pose.position());
+    let (range_m, bearing_rad) = feature.predict(arc.place(pose));
     let off_m = (range_m - arc.range_m).abs();
     let off_deg = wrap_pi(pose.direction_rad(arc.azimuth_deg) - bearing_rad).to_degrees().abs();
     let gate_m = arc.errors.gate_m(gate_m);
-    let gate_deg = GATE_DEG * arc.errors.bearing_factor() * if arc.is_cut { CUT_GATE } else { 1.0 };
+    let gate_deg = if arc.is_cut { CUT_GATE * GATE_DEG } else { GATE_DEG };
+    let gate_deg = arc.errors.bearing_factor() * blurred(gate_deg, GATE_STEPS * arc.step_deg);
     let is_near = off_m < gate_m && off_deg < gate_deg;
     is_near.then(|| {
         (off_m / arc.errors.sigma_m(SIGMA_M)).powi(2) + (off_deg / arc.sigma_deg()).powi(2)
@@ -317,7 +320,13 @@ fn agreement(features: &[SupportedFeature], arcs: &[Arc], pose: &Pose, sigma_m: 
     let of_arc = |arc: &Arc| {
         let direction_rad = pose.direction_rad(arc.azimuth_deg);
         let sigma_rad = 1.5 * arc.sigma_deg().max(1.2).to_radians();
+        let face = arc.face_of(pose);
         let best = predictions.iter().filter_map(|&(range_m, bearing_rad, weight)| {
+            // To the first order of the transducer's offset from the axis.
+            let range_m = match face == DVec2::ZERO {
+                true => range_m,
+                false => range_m - face.dot(DVec2::from_angle(bearing_rad)),
+            };
             let off_m = ((range_m - arc.range_m) / sigma_m).powi(2);
             if off_m > FAR {
                 return None;

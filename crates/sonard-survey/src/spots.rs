@@ -100,7 +100,9 @@ pub(crate) fn consistent_arcs<'a>(
     {
         let of = |arc| explain(arc, readings, predictions, explained_m, SHARE);
         let explained: Vec<ExplainedArc> = arcs.iter().filter_map(of).collect();
-        if (explained.len() as f64) < min_share * arcs.len() as f64 {
+        let is_lost = (explained.len() as f64) < min_share * arcs.len() as f64;
+        // A round of an array has few arcs, and odometry holds its pose.
+        if is_lost && !workspace.is_array {
             return None;
         }
         all.extend(explained);

@@ -5,11 +5,15 @@ mod survey_search;
 use std::collections::HashSet;
 
 use sonard_inverse::{FitSweep, World};
-use sonard_model::geometry::{DVec2, Pose};
+use sonard_model::{
+    acoustics::Mounting,
+    geometry::{DVec2, Pose},
+};
 
 use crate::{
     arrangement::{LineArrangement, Segment},
     error::SurveyError,
+    input::SurveyInput,
     judge::Judge,
     odometry::Move,
     options::SurveyOptions,
@@ -38,15 +42,20 @@ const SEARCH_SHARE: f64 = 0.7;
 /// and the face of the sensor is assumed on the axis of the stepper or ahead of it. The result is
 /// independent of the number of threads.
 ///
+/// Rounds of an array are predicted from the pose of the robot, to the first order of the offsets of
+/// the transducers: exactly for echoes of plane walls, without the change of strength with range. No
+/// numbers are fitted to them, and the result has no next view.
+///
 /// # Errors
-/// Fewer than two sweeps, a sweep without arcs, or an invalid sensor or option.
-pub fn survey(
+/// Fewer than two sweeps or rounds, a sweep without arcs, numbers to fit for an array, or an invalid
+/// sensor or option.
+pub fn survey<'a>(
     world: &World,
-    sweeps: &[FitSweep],
+    input: impl Into<SurveyInput<'a>>,
     options: &SurveyOptions,
     observer: &dyn SurveyObserver,
 ) -> Result<Survey, SurveyError> {
-    resume_survey(world, sweeps, options, &PlanScores::default(), observer)
+    resume_survey(world, input, options, &PlanScores::default(), observer)
 }
 
 /// Reconstructs a room as [`survey`], with the scores of a search that ended early, which are
@@ -54,13 +63,15 @@ pub fn survey(
 ///
 /// # Errors
 /// As [`survey`].
-pub fn resume_survey(
+pub fn resume_survey<'a>(
     world: &World,
-    sweeps: &[FitSweep],
+    input: impl Into<SurveyInput<'a>>,
     options: &SurveyOptions,
     scores: &PlanScores,
     observer: &dyn SurveyObserver,
 ) -> Result<Survey, SurveyError> {
+    let input = input.into();
+    let sweeps = &input.sweeps();
     let mut fitter = SensorFitter::new(world, options)?;
     let mut scored = HashSet::new();
     let mut last: Option<PosedPlan> = None;
@@ -69,7 +80,7 @@ pub fn resume_survey(
         let options = &SurveyOptions { reflectance, ..options.clone() };
         // Repeated contacts with posts take most of the time near them, and change few readings: the
         // final estimate and the alternatives include them.
-        let workspace = workspace(&world, sweeps, options, (observer, scores))?
+        let workspace = workspace(&world, (input, sweeps), options, (observer, scores))?
             .following(scored, fitter.digest())
             .with_single_contacts()?;
         workspace.limit_scenes((SEARCH_SHARE * options.max_scenes as f64) as usize);
@@ -104,15 +115,17 @@ pub fn resume_survey(
 ///
 /// # Errors
 /// As [`survey`].
-pub fn score_plan(
+pub fn score_plan<'a>(
     world: &World,
-    sweeps: &[FitSweep],
+    input: impl Into<SurveyInput<'a>>,
     options: &SurveyOptions,
     (walls, posts): (&[[DVec2; 2]], &[PostShape]),
     poses: &[Pose],
 ) -> Result<f64, SurveyError> {
     let scores = PlanScores::default();
-    let workspace = workspace(world, sweeps, options, (&NoObserver, &scores))?;
+    let input = input.into();
+    let sweeps = &input.sweeps();
+    let workspace = workspace(world, (input, sweeps), options, (&NoObserver, &scores))?;
     let sigma_m = workspace.errors.final_sigma_m();
     let judge = Judge::new(&workspace, poses, sigma_m).with_posts(posts);
     let segment = |(line, &[a, b]): (usize, &[DVec2; 2])| Segment { line, a, b };
@@ -132,7 +145,7 @@ pub fn score_refined_plan(
     poses: &[Pose],
 ) -> Result<f64, SurveyError> {
     let scores = PlanScores::default();
-    let workspace = workspace(world, sweeps, options, (&NoObserver, &scores))?;
+    let workspace = workspace(world, (sweeps.into(), sweeps), options, (&NoObserver, &scores))?;
     let (plan, walls) = LineArrangement::of_walls(walls, poses, workspace.reach_m());
     let given = PosedPlan { plan, walls, posts: Vec::new(), poses: poses.to_vec() };
     Ok(SurveySearch::with_plan(&workspace, options, given).refine_given())
@@ -140,7 +153,7 @@ pub fn score_refined_plan(
 
 pub(crate) fn workspace<'a>(
     world: &World,
-    sweeps: &'a [FitSweep],
+    (input, sweeps): (SurveyInput<'a>, &'a [FitSweep]),
     options: &SurveyOptions,
     watched: (&'a dyn SurveyObserver, &'a PlanScores),
 ) -> Result<Workspace<'a>, SurveyError> {
@@ -148,20 +161,35 @@ pub(crate) fn workspace<'a>(
         return Err(SurveyError::TooFewSweeps(sweeps.len()));
     }
     options.check()?;
+    if input.is_array() && !options.fit.is_empty() {
+        return Err(SurveyError::FitOfArray);
+    }
     let errors = RangeErrors::new(&world.sensor, options);
+    let mut world = world.clone();
+    if input.is_array() {
+        // The positions of the transducers include it.
+        world.sensor.mounting = Mounting { z_m: world.sensor.mounting.z_m, ..Mounting::default() };
+    }
     let left_m = world.sensor.mounting.left_m;
-    let world = &empty_world(world, options.reflectance);
+    let world = &empty_world(&world, options.reflectance);
     let simulator = world.simulator(&sweeps[0].pose)?;
     let max_range_m = simulator.receiver().max_range_m;
-    let readings: Vec<Readings> =
-        sweeps.iter().map(|sweep| Readings::new(sweep, world, max_range_m, options)).collect();
+    let of_sweep = |(at, sweep): (usize, &FitSweep)| {
+        Readings::new((sweep, input.faces(at).as_deref()), world, max_range_m, options)
+    };
+    let readings: Vec<Readings> = sweeps.iter().enumerate().map(of_sweep).collect();
     let poses: Vec<Pose> = sweeps.iter().map(|sweep| sweep.pose).collect();
     let between = |sigma| Move::between(&poses, sigma);
     let moves = options.odometry.map_or_else(Vec::new, between);
     let square_rad = options.square_deg.map(f64::to_radians);
     let model = (world.clone(), simulator);
     let workspace = Workspace::new(model, sweeps, (readings, errors), square_rad, moves, watched)
+        .with_array(input.is_array())
         .with_left_m(left_m);
+    if input.is_array() {
+        // A round far from all walls has no echo; odometry connects those beside it.
+        return Ok(workspace);
+    }
     let without = workspace.arcs.iter().zip(sweeps).find(|(arcs, _)| arcs.is_empty());
     match without {
         Some((_, sweep)) => Err(SurveyError::NoArcs(sweep.scan)),

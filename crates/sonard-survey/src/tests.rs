@@ -1,5 +1,6 @@
 //! Tests of the stages against known rooms.
 
+mod array;
 mod boxes;
 mod coarse;
 mod next_view;
@@ -116,7 +117,7 @@ fn true_workspace<'a>(
     sweeps: &'a [FitSweep],
     watched: (&'a dyn SurveyObserver, &'a PlanScores),
 ) -> Workspace<'a> {
-    workspace(world, sweeps, &options(), watched).expect("sweeps with arcs")
+    workspace(world, (sweeps.into(), sweeps), &options(), watched).expect("sweeps with arcs")
 }
 
 /// Arrangement of the lines through pairs of points, with the pieces between the points as walls.

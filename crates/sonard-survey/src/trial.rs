@@ -10,5 +10,5 @@ mod tests;
 
 pub use compare::{Comparison, Ends, RigidMotion, coverage, is_post_at};
 pub use explorer::{Explorer, ExplorerSettings, Way};
-pub use readings::{ReadingNoise, simulate_sweeps, trial_world};
-pub use rooms::{RoomKind, draw_place, draw_trial, drift, extent, generator, is_free};
+pub use readings::{ReadingNoise, simulate_rounds, simulate_sweeps, trial_world};
+pub use rooms::{RoomKind, draw_place, draw_trial, drift, extent, generator, is_free, poses_along};

@@ -26,6 +26,8 @@ pub(crate) struct Workspace<'a> {
     /// Empty world with the transducer on the axis.
     pub(crate) world: World,
     pub(crate) sweeps: &'a [FitSweep],
+    /// Sweeps are rounds of an array.
+    pub(crate) is_array: bool,
     /// Simulator of that world, whose scene gives material and options, without walls.
     pub(crate) simulator: Simulator,
     /// Scores are without echoes that touch posts more than once, or a post and an edge.
@@ -63,6 +65,7 @@ impl<'a> Workspace<'a> {
         Self {
             world,
             sweeps,
+            is_array: false,
             simulator,
             single_contacts: false,
             readings,
@@ -95,6 +98,11 @@ impl<'a> Workspace<'a> {
     pub(crate) fn with_all_contacts(self) -> Result<Self, SurveyError> {
         let simulator = self.world.simulator(&self.sweeps[0].pose)?;
         Ok(Self { simulator, single_contacts: false, ..self })
+    }
+
+    /// Workspace whose sweeps are rounds of an array, or not.
+    pub(crate) fn with_array(self, is_array: bool) -> Self {
+        Self { is_array, ..self }
     }
 
     /// Workspace with the face left of the axis, metres.

@@ -42,7 +42,7 @@ impl Head {
     pub(super) fn new(args: &Args, input: &Input) -> Self {
         let options = SurveyOptions { max_scenes: 0, view_reach_m: 0.0, ..args.options() };
         let survey_sha256 =
-            digest(format_args!("{:?} {:?} {options:?}", input.world, input.sweeps));
+            digest(format_args!("{:?} {:?} {options:?}", input.world, input.course));
         Self { survey_sha256, version: env!("CARGO_PKG_VERSION").to_owned() }
     }
 }

@@ -81,13 +81,11 @@ fn corner(end: &SurveyedEnd) -> Option<(DVec2, f64)> {
 
 /// Echoes at the poses found.
 fn echoes(input: &Input, found: &Survey) -> Vec<(DVec2, EchoCause)> {
-    let sound_speed_m_s = input.world.air.sound_speed_m_s();
+    let beams = input.course.beams(input.world.air.sound_speed_m_s());
     let mut echoes = Vec::new();
-    for ((sweep, of), causes) in input.sweeps.iter().zip(&found.poses).zip(&found.causes) {
-        let mut beams: Vec<_> = sweep.beams.iter().collect();
-        let azimuth_deg = |azimuth_deg: f64| crate::geometry::wrap_360(azimuth_deg);
-        beams.sort_by(|a, b| azimuth_deg(a.azimuth_deg).total_cmp(&azimuth_deg(b.azimuth_deg)));
-        for (beam, cause) in beams.into_iter().zip(causes) {
+    for ((beams, of), causes) in beams.into_iter().zip(&found.poses).zip(&found.causes) {
+        let frame = DVec2::from_angle(of.pose.heading_deg.to_radians());
+        for ((position, azimuth_deg, range_m), cause) in beams.into_iter().zip(causes) {
             let cause = match cause {
                 ReadingCause::First => EchoCause::First,
                 ReadingCause::Multiple => EchoCause::Multiple,
@@ -95,8 +93,9 @@ fn echoes(input: &Input, found: &Survey) -> Vec<(DVec2, EchoCause)> {
                 ReadingCause::Unexplained => EchoCause::Unexplained,
                 ReadingCause::NoRange => continue,
             };
-            if let Some(range_m) = beam.range_m(sound_speed_m_s) {
-                echoes.push((of.pose.point_at(beam.azimuth_deg, range_m), cause));
+            if let Some(range_m) = range_m {
+                let from_axis = of.pose.point_at(azimuth_deg, range_m);
+                echoes.push((from_axis + frame.rotate(position), cause));
             }
         }
     }

@@ -22,7 +22,7 @@ pub(super) fn in_short(input: &Input, found: &Survey) -> String {
     };
     format!(
         "{walls}{posts} from {}; {explained} of {} explained",
-        format_count(input.sweeps.len(), "sweep"),
+        input.course.count(),
         format_count(found.arcs, "arc"),
     )
 }

@@ -14,15 +14,16 @@ use std::error::Error;
 
 use sonard_inverse::ParameterGroup;
 use sonard_model::{
+    array::RangerArray,
     geometry::{DVec2, Pose},
     scene::Scene,
 };
 use sonard_survey::{
-    NoObserver, OdometrySigma, PieceStatus, PostShape, SearchEnd, Survey, SurveyOptions,
-    score_plan, survey,
+    NoObserver, OdometrySigma, PieceStatus, PostShape, SearchEnd, Survey, SurveyInput,
+    SurveyOptions, score_plan, survey,
     trial::{
         Comparison, Ends, ReadingNoise, RigidMotion, RoomKind, coverage, draw_place, draw_trial,
-        drift, generator, simulate_sweeps, trial_world,
+        drift, generator, poses_along, simulate_rounds, simulate_sweeps, trial_world,
     },
 };
 
@@ -36,7 +37,11 @@ struct Settings {
     kinds: Vec<RoomKind>,
     seeds: std::ops::Range<u64>,
     stops: usize,
+    /// Number of sweeps along the course of the stops; `None` for one at each stop.
+    poses: Option<usize>,
     beams: usize,
+    /// Array that moves along the course, instead of a ranger on a stepper.
+    array: Option<RangerArray>,
     odometry: [f64; 2],
     odometry_is_used: bool,
     square_deg: Option<f64>,
@@ -139,12 +144,20 @@ held | true room | score within 5 | wrong observed m | outer recall | recall of 
 
 fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn Error>> {
     let mut random = generator(kind, seed);
-    let (room, poses) = draw_trial(kind, settings.stops, &mut random)?;
+    let (room, course) = draw_trial(kind, settings.stops, &mut random)?;
+    let poses = settings.poses.map_or(course.clone(), |count| poses_along(&course, count));
     let assumed = trial_world(room)?;
     let world = settings.truth.applied(&assumed)?;
     let odometry = drift(&poses, settings.odometry, &mut random);
-    let mut readings =
-        simulate_sweeps(&world, &poses, settings.beams, settings.noise, &mut random)?;
+    let (mut sweeps, mut rounds) = (Vec::new(), Vec::new());
+    match &settings.array {
+        Some(array) => {
+            rounds = simulate_rounds(&world, array, &poses, settings.noise, &mut random)?;
+        }
+        None => {
+            sweeps = simulate_sweeps(&world, &poses, settings.beams, settings.noise, &mut random)?;
+        }
+    }
     let held: Vec<Pose> = (0..HELD_PLACES)
         .map(|at| {
             let place = draw_place(&world.scene, &mut random);
@@ -152,12 +165,19 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
         })
         .collect();
     let held_out = simulate_sweeps(&world, &held, settings.beams, settings.noise, &mut random)?;
-    for (sweep, pose) in readings.iter_mut().zip(&odometry) {
+    for (sweep, pose) in sweeps.iter_mut().zip(&odometry) {
         sweep.pose = *pose;
     }
+    for (round, pose) in rounds.iter_mut().zip(&odometry) {
+        round.pose = *pose;
+    }
+    let readings = match settings.array {
+        Some(_) => SurveyInput::from(&rounds),
+        None => SurveyInput::from(&sweeps),
+    };
     let options = settings.survey_options();
     let start_s = cpu_s();
-    let found = survey(&assumed, &readings, &options, &NoObserver)?;
+    let found = survey(&assumed, readings, &options, &NoObserver)?;
     let seconds = cpu_s() - start_s;
     let truth: Vec<Ends> = world.scene.walls.iter().map(|wall| [wall.a, wall.b]).collect();
     let cylinders = world.scene.cylinders.iter();
@@ -165,7 +185,7 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
         cylinders.map(|of| PostShape { center: of.center, radius_m: of.radius_m }).collect();
     // Plans are scored with the same sensor.
     let scorer = if settings.fit.is_empty() { &assumed } else { &world };
-    let true_score = score_plan(scorer, &readings, &options, (&truth, &true_posts), &poses)?;
+    let true_score = score_plan(scorer, readings, &options, (&truth, &true_posts), &poses)?;
     let compared = Comparison::new(&found, &world.scene, &poses);
     let Comparison { motion, walls, recall, precision, corners_m, .. } = compared;
     let observed = observed(&found, &motion);
@@ -369,7 +389,9 @@ impl Settings {
             kinds: RoomKind::ALL.to_vec(),
             seeds: 0..4,
             stops: 8,
+            poses: None,
             beams: 400,
+            array: None,
             odometry: [0.05, 5.0],
             odometry_is_used: true,
             square_deg: None,
@@ -415,6 +437,8 @@ impl Settings {
                     settings.seeds = from.parse()?..to.parse()?;
                 }
                 "--stops" => settings.stops = value.parse()?,
+                "--poses" => settings.poses = Some(value.parse()?),
+                "--array" => settings.array = Some(RangerArray::preset(&value)?),
                 "--beams" => settings.beams = value.parse()?,
                 "--odometry" => {
                     let (m, deg) = value.split_once(',').ok_or("--odometry: use M,DEG")?;

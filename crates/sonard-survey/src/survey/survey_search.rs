@@ -110,7 +110,8 @@ impl<'a> SurveySearch<'a> {
 
     /// Returns `true` if the sweeps begin at the poses of odometry rather than of the virtual map.
     fn begins_at_odometry(&self) -> bool {
-        self.errors().is_coarse() && self.options.odometry.is_some()
+        let is_array = self.workspace.is_array;
+        self.errors().is_coarse() && self.options.odometry.is_some() && !is_array
     }
 
     /// Begins with a course and no walls.
@@ -380,14 +381,19 @@ impl<'a> SurveySearch<'a> {
         self.score = Some(self.score_now(sigma_m));
     }
 
-    /// Moves poses by the likelihood of a coarse ranger's readings, less far with each round.
+    /// Moves poses by the likelihood of the readings of a coarse ranger or of an array, less far with
+    /// each round.
     fn improve_poses(&mut self, judge: &Judge, number: usize) {
         /// Spans of the first round, metres and degrees.
-        const SPANS: [f64; 2] = [0.03, 8.0];
-        if self.errors().is_coarse() {
-            let parts = (number.min(ROUNDS.len() - 1) + 1) as f64;
-            improve_poses(&mut self.posed, judge, SPANS.map(|span| span / parts));
-        }
+        const OF_COARSE: [f64; 2] = [0.03, 8.0];
+        const OF_ARRAY: [f64; 2] = [0.01, 3.0];
+        let spans = match (self.errors().is_coarse(), self.workspace.is_array) {
+            (true, _) => OF_COARSE,
+            (false, true) => OF_ARRAY,
+            (false, false) => return,
+        };
+        let parts = (number.min(ROUNDS.len() - 1) + 1) as f64;
+        improve_poses(&mut self.posed, judge, spans.map(|span| span / parts));
     }
 
     fn refine(&mut self, judge: &Judge, gate_m: f64) {
@@ -464,6 +470,9 @@ impl<'a> SurveySearch<'a> {
     /// With a coarse ranger an estimate that scores lower is dropped: where arcs end depends on a
     /// sensitivity that is not known well, and its few wide beams let that move the poses.
     fn polish(&mut self, judge: &Judge) {
+        if self.workspace.is_array {
+            return;
+        }
         let is_coarse = self.errors().is_coarse();
         let before = is_coarse.then(|| (self.posed.clone(), self.score_now(judge.sigma_m)));
         polish(&mut self.posed, judge);

@@ -244,7 +244,9 @@ fn free_headings_are_those_of_the_readings() {
     let sigma = OdometrySigma { deg_per_stop: 5.0, ..OdometrySigma::default() };
     let options = SurveyOptions { odometry: Some(sigma), ..options() };
     let scores = PlanScores::default();
-    let workspace = workspace(&world, &sweeps, &options, (&NoObserver, &scores)).expect("arcs");
+    let workspace =
+        workspace(&world, ((&sweeps).into(), &sweeps), &options, (&NoObserver, &scores))
+            .expect("arcs");
     let (plan, walls) = plan_of(&sides(&corners), &poses);
     let segments = plan.segments(&walls);
     let fixed = Judge::new(&workspace, &odometry, 0.01);

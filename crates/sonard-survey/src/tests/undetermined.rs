@@ -95,7 +95,8 @@ fn half_turn_of_a_rectangle_is_open_without_odometry() {
         let scores = PlanScores::default();
         let options = SurveyOptions { odometry, ..options() };
         let workspace =
-            workspace(&world, &sweeps, &options, (&NoObserver, &scores)).expect("sweeps");
+            workspace(&world, ((&sweeps).into(), &sweeps), &options, (&NoObserver, &scores))
+                .expect("sweeps");
         let found = equivalent_poses(&posed, &Judge::new(&workspace, &poses, 0.004));
         assert!(found[0].is_empty());
         let (center, is_open) = (corners[0].midpoint(corners[2]), odometry.is_none());
@@ -115,7 +116,9 @@ fn lost_sweep_is_located_in_the_plan_of_the_others() {
     let (corners, truth, world, sweeps) = true_rectangle();
     let options = SurveyOptions { odometry: None, ..options() };
     let scores = PlanScores::default();
-    let workspace = workspace(&world, &sweeps, &options, (&NoObserver, &scores)).expect("sweeps");
+    let workspace =
+        workspace(&world, ((&sweeps).into(), &sweeps), &options, (&NoObserver, &scores))
+            .expect("sweeps");
     let mut poses = truth.clone();
     let posed = |poses: &[Pose]| {
         let (plan, walls) = plan_of(&sides(&corners), poses);

@@ -2,10 +2,13 @@
 
 use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StudentT};
-use sonard_inverse::{FiringOutcome, FitSweep, SweepFiring, World, WorldError};
+use sonard_inverse::{
+    ArrayFiring, ArrayRound, FiringOutcome, FitSweep, SweepFiring, World, WorldError,
+};
 use sonard_model::{
     acoustics::{Air, Sensor, SensorError},
-    geometry::Pose,
+    array::RangerArray,
+    geometry::{DVec2, Pose},
     model::{Options, Simulator},
     reading::PingStatus,
     scene::Scene,
@@ -80,6 +83,35 @@ pub fn simulate_sweeps(
         found.push(FitSweep { scan: Uuid::from_u128(number), pose: *pose, beams: fired });
     }
     Ok(found)
+}
+
+/// Simulates a round of an array from each pose, the robot standing still; its body is left out.
+///
+/// # Errors
+/// Invalid sensor, or more paths than can be found.
+pub fn simulate_rounds(
+    world: &World,
+    array: &RangerArray,
+    poses: &[Pose],
+    noise: ReadingNoise,
+    random: &mut impl Rng,
+) -> Result<Vec<ArrayRound>, WorldError> {
+    let mut rounds = Vec::with_capacity(poses.len());
+    for (pose, number) in poses.iter().zip(1u128..) {
+        let mut firings = Vec::with_capacity(array.rangers.len());
+        for ranger in &array.rangers {
+            let own = [ranger.world_pose(pose)];
+            let swept = simulate_sweeps(world, &own, 1, noise, random)?;
+            let beams = swept.iter().flat_map(|sweep| &sweep.beams);
+            firings.extend(beams.map(|beam| ArrayFiring {
+                position: DVec2::new(ranger.x_m, ranger.y_m),
+                azimuth_deg: ranger.azimuth_deg(),
+                outcome: beam.outcome,
+            }));
+        }
+        rounds.push(ArrayRound { scan: Uuid::from_u128(number), pose: *pose, firings });
+    }
+    Ok(rounds)
 }
 
 fn pick(weights: &[f64], random: &mut impl Rng) -> usize {

@@ -294,6 +294,25 @@ fn draw_course(scene: &Scene, stops: usize, random: &mut impl Rng) -> Vec<Pose> 
     (0..places.len()).map(pose).collect()
 }
 
+/// Poses at equal distances along a course, each with the heading of its leg.
+#[must_use]
+pub fn poses_along(course: &[Pose], count: usize) -> Vec<Pose> {
+    let leg_m = |pair: &[Pose]| pair[0].position().distance(pair[1].position());
+    let total_m: f64 = course.windows(2).map(leg_m).sum();
+    let pose = |at: usize| {
+        let mut rest_m = total_m * at as f64 / count.saturating_sub(1).max(1) as f64;
+        let leg = course.windows(2).find(|pair| {
+            let is_here = rest_m <= leg_m(pair);
+            rest_m -= if is_here { 0.0 } else { leg_m(pair) };
+            is_here
+        });
+        let (Some(leg), true) = (leg, at + 1 < count) else { return course.last().copied() };
+        let place = leg[0].position().lerp(leg[1].position(), rest_m / leg_m(leg).max(1e-9));
+        Some(Pose { x_m: place.x, y_m: place.y, heading_deg: leg[0].heading_deg })
+    };
+    (0..count).filter_map(pose).collect()
+}
+
 /// Odometry of a course whose moves have errors: standard deviations of the position, metres per
 /// metre, and of the heading, degrees per metre.
 pub fn drift(poses: &[Pose], per_m: [f64; 2], random: &mut impl Rng) -> Vec<Pose> {

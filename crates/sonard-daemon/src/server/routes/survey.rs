@@ -228,7 +228,10 @@ fn invalid(error: &str, help: &str, field: String) -> ApiError {
 
 fn survey_error(error: &SurveyError) -> ApiError {
     let (status, help) = match error {
-        SurveyError::Option { .. } | SurveyError::Group(_) | SurveyError::NotFittable { .. } => {
+        SurveyError::Option { .. }
+        | SurveyError::Group(_)
+        | SurveyError::NotFittable { .. }
+        | SurveyError::FitOfArray => {
             (StatusCode::UNPROCESSABLE_ENTITY, "see `sonard survey --help`")
         }
         SurveyError::TooFewSweeps(_) => (StatusCode::UNPROCESSABLE_ENTITY, "send further sweeps"),

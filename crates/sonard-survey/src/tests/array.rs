@@ -1,0 +1,178 @@
+//! Rounds of an array on a moving robot.
+
+use sonard_inverse::{ArrayFiring, ArrayRound, ParameterGroup};
+use sonard_model::{acoustics::Mounting, array::RangerArray};
+
+use super::*;
+use crate::{
+    arc::Arc as RangeArc,
+    bundle::{Bundle, SupportedFeature},
+    error::SurveyError,
+    feature::VirtualFeature,
+    input::SurveyInput,
+    judge::{Judge, outcome_of},
+    progress::NoObserver,
+    range_errors::RangeErrors,
+    readings::Outcome,
+    survey::survey,
+    trial::poses_along,
+};
+
+fn ring() -> RangerArray {
+    RangerArray::preset("ring-12").expect("a preset")
+}
+
+/// Rounds of the ring, predicted from the true positions of its rangers, with other poses as
+/// odometry.
+fn rounds(world: &World, poses: &[Pose], odometry: &[Pose]) -> Vec<ArrayRound> {
+    let firings = |pose: &Pose| {
+        let of_ranger = |ranger: &sonard_model::array::MountedRanger| {
+            let own = ranger.world_pose(pose);
+            let swept = sweeps(world, &[own], &[own]);
+            // The first of its beams is along the bearing of the ranger.
+            ArrayFiring {
+                position: DVec2::new(ranger.x_m, ranger.y_m),
+                azimuth_deg: ranger.bearing_deg,
+                outcome: swept[0].beams[0].outcome,
+            }
+        };
+        ring().rangers.iter().map(of_ranger).collect()
+    };
+    let round = |(number, (pose, odometry)): (u128, (&Pose, &Pose))| ArrayRound {
+        scan: Uuid::from_u128(number),
+        pose: *odometry,
+        firings: firings(pose),
+    };
+    (1..).zip(poses.iter().zip(odometry)).map(round).collect()
+}
+
+/// Echoes of walls are predicted for the positions of the rangers: from the pose of the robot, 16 cm
+/// from them, ranges differ by up to as much.
+#[test]
+fn ranges_of_walls_are_those_from_the_rangers() {
+    let (corners, poses, world, _) = true_rectangle();
+    let rounds = rounds(&world, &poses, &poses);
+    let (input, scores) = (SurveyInput::from(&rounds), PlanScores::default());
+    let sweeps = input.sweeps();
+    let workspace =
+        workspace(&world, (input, &sweeps), &options(), (&NoObserver, &scores)).expect("rounds");
+    let judge = Judge::new(&workspace, &poses, 0.004);
+    let segments: Vec<_> = sides(&corners)
+        .into_iter()
+        .enumerate()
+        .map(|(line, [a, b])| crate::arrangement::Segment { line, a, b })
+        .collect();
+    let (_, predictions) = judge.predictions(&segments).expect("few paths");
+    let mut compared = 0;
+    for (readings, predictions) in workspace.readings.iter().zip(&predictions) {
+        for (beam, prediction) in readings.beams.iter().zip(predictions) {
+            let is_single =
+                prediction.arrival.as_ref().is_some_and(|of| of.path.interactions.len() == 1);
+            // A weak echo is late by up to centimetres, and strength depends on the position.
+            let is_strong = prediction.margin_db.is_some_and(|margin_db| margin_db > 20.0);
+            if let (Outcome::Echo(measured_m), Outcome::Echo(expected_m), true) =
+                (beam.outcome, outcome_of(prediction), is_single && is_strong)
+            {
+                assert!((measured_m - expected_m).abs() < 1e-3, "{measured_m} {expected_m}");
+                assert!(beam.face.length() > 0.15);
+                compared += 1;
+            }
+        }
+    }
+    assert!(compared > 8, "{compared}");
+}
+
+/// Arcs of transducers off the axis, from true ranges and bearings, give poses and lines.
+#[test]
+fn bundle_recovers_poses_from_transducers_off_the_axis() {
+    let truth = stops();
+    let lines = [(0.1, 2.5), (1.4, 2.0), (3.3, 1.5)].map(|(n, d)| VirtualFeature::line(n, d));
+    let faces = [[0.16, 0.0], [0.05, 0.15], [-0.1, 0.12]].map(DVec2::from);
+    let arc = |sweep: usize, feature: &VirtualFeature, face: DVec2| {
+        let pose = &truth[sweep];
+        let place = pose.position() + DVec2::from_angle(pose.heading_deg.to_radians()).rotate(face);
+        let (range_m, bearing_rad) = feature.predict(place);
+        RangeArc {
+            sweep,
+            face,
+            azimuth_deg: bearing_rad.to_degrees() - pose.heading_deg,
+            range_m,
+            is_cut: false,
+            beams: vec![0],
+            step_deg: 30.0,
+            errors: RangeErrors::default(),
+        }
+    };
+    let arcs: Vec<Vec<RangeArc>> = lines
+        .iter()
+        .map(|line| {
+            (0..truth.len()).flat_map(|sweep| faces.map(|face| arc(sweep, line, face))).collect()
+        })
+        .collect();
+    let supported = lines.iter().zip(&arcs).map(|(line, arcs)| SupportedFeature {
+        feature: line.moved([0.01, 0.02]),
+        arcs: arcs.iter().collect(),
+    });
+    let (mut poses, mut features) = (drifted(&truth), supported.collect());
+    Bundle { poses: &mut poses, features: &mut features, moves: &[] }.solve().expect("determined");
+    for (found, expected) in poses.iter().zip(&truth) {
+        assert!(found.position().distance(expected.position()) < 1e-4, "{found:?} {expected:?}");
+        assert!((found.heading_deg - expected.heading_deg).abs() < 0.01, "{found:?} {expected:?}");
+    }
+}
+
+#[test]
+fn rounds_of_a_ring_give_the_room() {
+    let (corners, _, world, _) = true_rectangle();
+    let poses = poses_along(&stops(), 20);
+    let mut odometry = poses.clone();
+    for (at, pose) in odometry.iter_mut().enumerate() {
+        (pose.x_m, pose.y_m) = (pose.x_m + 0.003 * at as f64, pose.y_m - 0.002 * at as f64);
+        pose.heading_deg += 0.3 * at as f64;
+    }
+    let rounds = rounds(&world, &poses, &odometry);
+    let found = survey(&world, &rounds, &options(), &NoObserver).expect("a survey");
+    let scene = found.scene("found", false).build().expect("a valid scene");
+    let compared = crate::trial::Comparison::new(&found, &world.scene, &poses);
+    assert!(compared.recall > 0.9 && compared.precision > 0.95, "{scene:#?}");
+    assert!(found.next_view.is_none() && found.poses.len() == 20);
+    // All four sides, each with a piece.
+    for [a, b] in sides(&corners) {
+        let middle = compared.motion.inverse_of(&Pose {
+            x_m: a.midpoint(b).x,
+            y_m: a.midpoint(b).y,
+            heading_deg: 0.0,
+        });
+        let is_near = scene.clearance_m(middle.position()) < 0.03;
+        assert!(is_near, "{a} to {b}: {scene:#?}");
+    }
+}
+
+/// The mounting of the sensor is part of the positions of the rangers, and a round far from all
+/// walls has no echo.
+#[test]
+fn mounting_counts_once_and_rounds_may_be_silent() {
+    let (_, poses, world, _) = true_rectangle();
+    let mut rounds = rounds(&world, &poses, &poses);
+    rounds[2].firings.iter_mut().for_each(|of| of.outcome = FiringOutcome::NoEcho);
+    let readings_of = |world: &World| {
+        let (input, scores) = (SurveyInput::from(&rounds), PlanScores::default());
+        let sweeps = input.sweeps();
+        let workspace = workspace(world, (input, &sweeps), &options(), (&NoObserver, &scores));
+        let workspace = workspace.expect("rounds");
+        assert!(workspace.arcs[2].is_empty() && !workspace.arcs[1].is_empty());
+        workspace.readings
+    };
+    let mut ahead = world.clone();
+    ahead.sensor.mounting = Mounting { ahead_m: 0.05, left_m: 0.01, ..Mounting::default() };
+    assert_eq!(readings_of(&world), readings_of(&ahead));
+}
+
+#[test]
+fn numbers_are_not_fitted_to_rounds() {
+    let (_, poses, world, _) = true_rectangle();
+    let rounds = rounds(&world, &poses, &poses);
+    let options = SurveyOptions { fit: vec![ParameterGroup::Threshold], ..options() };
+    let error = survey(&world, &rounds, &options, &NoObserver).expect_err("no survey");
+    assert_eq!(error, SurveyError::FitOfArray);
+}
