@@ -96,7 +96,7 @@ pub(super) struct Args {
 }
 
 pub(super) const ABOUT: &str = "\
-Reconstruct an unknown room from sweeps taken at a few places.
+Reconstruct an unknown room from sweeps taken at a few places, or from an array on a moving robot.
 
 Poses come first: mirror images of walls are lines and mirror images of corners are points, so \
 echoes of any order locate the sweeps, with odometry as prior. Walls are then placed on lines \

@@ -355,3 +355,105 @@ fn survey_fits_the_ranger() {
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("walls can't be fitted by a survey"), "{}", stderr(&output));
 }
+
+/// Log of a ring of rangers that moves through the room, whose poses drift by centimetres and degrees.
+fn ring_log(folder: &Path) -> String {
+    let [w, d] = SIDES_M;
+    let room = serde_json::json!({
+        "name": "room", "materials": {"wall": {"reflectance": 0.97}},
+        "walls": [{"id": "wall", "polyline": [[0, 0], [w, 0], [w, d], [0, d]], "closed": true, "material": "wall"}],
+    });
+    let (scene, course) = (path(folder, "ring-room.json"), path(folder, "course.csv"));
+    fs::write(&scene, room.to_string()).expect("written");
+    let along = (0..7).map(|at| format!("{},0.7,0", 0.6 + 0.2 * f64::from(at)));
+    let up = (0..6).map(|at| format!("1.9,{},90", 0.7 + 0.15 * f64::from(at)));
+    let rows: Vec<String> =
+        ["x_m,y_m,heading_deg".to_owned()].into_iter().chain(along.chain(up)).collect();
+    fs::write(&course, rows.join("\n")).expect("written");
+    let log = path(folder, "ring.jsonl");
+    let simulate = ["simulate", "--array", "ring-12", "--scene", &scene, "--poses", &course];
+    succeeds(&[&simulate[..], &["--max-range", "4", "-o", &log]].concat());
+    let text = fs::read_to_string(&log).expect("a log");
+    let mut scans = 0.0;
+    let drifted = text.lines().map(|line| {
+        let mut record: Value = serde_json::from_str(line).expect("JSON");
+        scans += f64::from(u8::from(record["type"] == "scan_start"));
+        if let Some(pose) = record.get_mut("pose").filter(|pose| pose.is_object()) {
+            for (name, error) in [("x_m", 0.004), ("y_m", -0.003), ("heading_deg", 0.4)] {
+                pose[name] = (pose[name].as_f64().expect("a number") + scans * error).into();
+            }
+        }
+        record.to_string() + "\n"
+    });
+    let drifted: String = drifted.collect();
+    fs::write(&log, drifted).expect("written");
+    log
+}
+
+#[test]
+fn array_on_a_moving_robot_gives_the_room() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (log, out) = (ring_log(folder.path()), path(folder.path(), "out"));
+    let printed = succeeds(&["survey", &log, "--max-range", "4", "--out", &out]);
+    assert!(printed.starts_with("4 walls from 13 rounds"), "{printed}");
+    assert!(printed.contains("next view: none: it is computed for a ranger on a stepper only"));
+    let text = fs::read_to_string(format!("{out}/survey.json")).expect("a survey");
+    let survey: Value = serde_json::from_str(&text).expect("JSON");
+    let walls = survey["walls"].as_array().expect("walls");
+    let mut lengths_m: Vec<f64> =
+        walls.iter().map(|wall| distance_m(&wall["from"]["at_m"], &wall["to"]["at_m"])).collect();
+    lengths_m.sort_by(f64::total_cmp);
+    let [w, d] = SIDES_M;
+    for (found_m, expected_m) in lengths_m.iter().zip([d, d, w, w]) {
+        assert!((found_m - expected_m).abs() < 0.02, "{lengths_m:?}");
+    }
+    // Of each reading a cause, in rounds of twelve.
+    let causes = survey["causes"].as_array().expect("causes");
+    assert!(
+        causes.len() == 13
+            && causes.iter().all(|of| of.as_array().is_some_and(|of| of.len() == 12))
+    );
+    let picture = fs::read_to_string(format!("{out}/plan.svg")).expect("a picture");
+    assert!(picture.contains("13 rounds"), "{}", &picture[..400]);
+
+    // Rounds that are farther apart.
+    let sparse = path(folder.path(), "sparse");
+    let spacing = ["survey", &log, "--max-range", "4", "--out", &sparse, "--round-spacing", "0.35"];
+    let printed = run(&[&spacing[..], &["--max-scenes", "100"]].concat());
+    let printed = String::from_utf8(printed.stdout).expect("text");
+    assert!(printed.lines().next().is_some_and(|line| line.contains("from 7 rounds")), "{printed}");
+}
+
+#[test]
+fn logs_that_do_not_belong_to_a_course_of_an_array_are_rejected() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let ring = ring_log(folder.path());
+    let sweep = sweeps(folder.path(), &Value::Null).swap_remove(0);
+    let out = path(folder.path(), "out");
+    let rejected = |arguments: &[&str], parts: &[&str]| {
+        let output = run(&[&["survey", "--out", &out], arguments].concat());
+        let text = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {text}");
+        assert!(parts.iter().all(|part| text.contains(part)), "{text}");
+        assert!(!Path::new(&out).join("survey.json").exists());
+    };
+    rejected(&[&ring, &sweep], &["scans of an array and of a ranger", "survey them separately"]);
+    rejected(&[&sweep, &ring], &["scans of an array and of a ranger", "survey them separately"]);
+    rejected(&[&ring, "--fit", "threshold"], &["can't be fitted", "leave out --fit"]);
+    rejected(&[&ring, "--round-spacing", "5"], &["too few"]);
+    // Sixteen courses, one after the other.
+    let text = fs::read_to_string(&ring).expect("a log");
+    let many = path(folder.path(), "many.jsonl");
+    let course = |number: u32| {
+        let renamed = text.lines().map(move |line| {
+            let mut record: Value = serde_json::from_str(line).expect("JSON");
+            if let Some(id) = record["scan"].as_str() {
+                record["scan"] = format!("{number:08x}{}", &id[8..]).into();
+            }
+            record.to_string() + "\n"
+        });
+        renamed.collect::<String>()
+    };
+    fs::write(&many, (0..16).map(course).collect::<String>()).expect("written");
+    rejected(&[&many], &["208 rounds", "--round-spacing"]);
+}

@@ -333,23 +333,18 @@ fn predict(simulator: &Simulator, readings: &Readings, pose: &Pose) -> Option<Ve
     let point = simulator.at(pose.position());
     let beams = readings.beams.iter();
     let of_beam = |beam: &Beam| {
-        let prediction = point.ping(pose.direction_rad(beam.azimuth_deg)).ok()?;
-        Some(at_face(prediction, beam, pose))
+        let direction_rad = pose.direction_rad(beam.azimuth_deg);
+        if beam.face == DVec2::ZERO {
+            return point.ping(direction_rad).ok();
+        }
+        let face = DVec2::from_angle(pose.heading_deg.to_radians()).rotate(beam.face);
+        let mut prediction = point.ping_beside(direction_rad, face).ok()?;
+        if prediction.range_m.is_some_and(|range_m| range_m > readings.max_range_m) {
+            (prediction.status, prediction.range_m) = (PingStatus::NoEcho, None);
+        }
+        Some(prediction)
     };
     beams.map(of_beam).collect()
-}
-
-/// Prediction for a transducer off the axis: to the first order of its offset, the paths are those
-/// from the axis, longer or shorter by the offset's part along them. For echoes of plane walls that
-/// is exact.
-fn at_face(mut prediction: Prediction, beam: &Beam, pose: &Pose) -> Prediction {
-    if beam.face != DVec2::ZERO
-        && let (Some(range_m), Some(arrival)) = (&mut prediction.range_m, &prediction.arrival)
-    {
-        let face = DVec2::from_angle(pose.heading_deg.to_radians()).rotate(beam.face);
-        *range_m -= face.dot(mean_direction(arrival));
-    }
-    prediction
 }
 
 /// Mean of the directions in which an echo leaves and from which it returns: minus the derivative of

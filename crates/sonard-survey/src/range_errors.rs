@@ -68,14 +68,6 @@ impl RangeErrors {
     pub(crate) fn bearing_factor(self) -> f64 {
         (self.final_sigma_m() / FINE_SIGMA_M).sqrt()
     }
-
-    /// Factor of the standard deviations of estimates. Nearer echoes cut most arcs of a coarse
-    /// ranger; the biases of their middles are common to many beams, and in a measured arena turn
-    /// walls and headings by up to five times what the normal equations give.
-    pub(crate) fn bias_factor(self) -> f64 {
-        const OF_COARSE: f64 = 3.0;
-        if self.is_coarse() { OF_COARSE } else { 1.0 }
-    }
 }
 
 #[cfg(test)]
@@ -93,7 +85,6 @@ mod tests {
         assert_eq!(fine.sigma_m(0.006).to_bits(), 0.006_f64.to_bits());
         assert_eq!(fine.gate_m(0.03).to_bits(), 0.03_f64.to_bits());
         assert_eq!(fine.bearing_factor().to_bits(), 1.0_f64.to_bits());
-        assert_eq!(fine.bias_factor().to_bits(), 1.0_f64.to_bits());
         sensor.range_step_m = 0.01;
         let coarse = RangeErrors::new(&sensor, &options);
         assert!(coarse.is_coarse());

@@ -36,6 +36,9 @@ pub(crate) struct Readings {
     pub(crate) step_deg: f64,
     /// Number of neighbouring beams whose errors are correlated because they share an arc.
     pub(crate) beams_per_arc: f64,
+    /// Maximum range, metres: that of the model, less the largest distance of a transducer from the
+    /// pose, so that the model follows all paths up to it.
+    pub(crate) max_range_m: f64,
     /// Minimum number of beams of an arc.
     pub(crate) min_arc_beams: usize,
 }
@@ -51,6 +54,8 @@ impl Readings {
     ) -> Self {
         /// Maximum number of beams that count as one.
         const MAX_PER_ARC: f64 = 8.0;
+        let faces_m = faces.unwrap_or_default().iter().map(|face| face.length());
+        let max_range_m = max_range_m - faces_m.fold(0.0, f64::max);
         let sound_speed_m_s = world.air.sound_speed_m_s();
         let outcome = |outcome: FiringOutcome| match (outcome, outcome.range_m(sound_speed_m_s)) {
             (_, Some(range_m)) if range_m - world.delay_m <= max_range_m => {
@@ -81,6 +86,7 @@ impl Readings {
             odometry: sweep.pose,
             beams,
             step_deg,
+            max_range_m,
             beams_per_arc: (options.arc_deg / step_deg).clamp(1.0, MAX_PER_ARC),
             min_arc_beams: options.min_arc_beams.unwrap_or(by_step),
         }

@@ -57,7 +57,7 @@ pub(crate) fn refine(
     let columns = LineColumns::new(posed);
     let normal = equations(posed, &columns, judge, gate_m)?;
     let covariance = PlanCovariance::new(normal.covariance()?, columns);
-    Some(covariance.scaled(judge.workspace.errors.bias_factor().powi(2)))
+    Some(covariance.scaled(judge.workspace.bias_factor().powi(2)))
 }
 
 /// Plan part of the way from one to another.

@@ -1,10 +1,14 @@
 //! Next view of a survey as text.
 
+use super::Course;
 use crate::survey::{NextView, OpenPart, ResolvedPart, Survey};
 
 /// Place and expected gain of the next view in a sentence, and one for each part that it resolves.
-pub(super) fn sentences(found: &Survey) -> (String, Vec<String>) {
+pub(super) fn sentences(course: &Course, found: &Survey) -> (String, Vec<String>) {
     let open = format!("{:.2} nats", found.open_nats);
+    if let Course::Rounds(_) = course {
+        return ("none: it is computed for a ranger on a stepper only".to_owned(), Vec::new());
+    }
     match &found.next_view {
         None if found.open_nats < 0.005 => ("none: nothing is open".to_owned(), Vec::new()),
         None => (format!("none: no reachable place resolves the {open} that are open"), Vec::new()),

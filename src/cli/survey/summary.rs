@@ -203,7 +203,7 @@ pub(super) fn print(out: &mut impl Write, input: &Input, found: &Survey) -> io::
     align_right(&mut poses, 0..usize::MAX);
     writeln!(out, "{}", fit(poses))?;
     remarks(found).iter().try_for_each(|remark| writeln!(out, "{remark}"))?;
-    let (view, parts) = next_view::sentences(found);
+    let (view, parts) = next_view::sentences(&input.course, found);
     writeln!(out, "next view: {view}")?;
     parts.iter().try_for_each(|part| writeln!(out, "  {part}"))
 }
@@ -227,7 +227,7 @@ pub(super) fn markdown(input: &Input, found: &Survey) -> String {
         text += "\n";
     }
     text += &table(&POSE_HEAD, pose_rows(found).map(|row| row.to_vec()));
-    let (view, parts) = next_view::sentences(found);
+    let (view, parts) = next_view::sentences(&input.course, found);
     let _ = writeln!(text, "\n## Next view\n\nNext view: {view}.");
     for (part, start) in parts.iter().zip(["\n"].into_iter().chain(std::iter::repeat(""))) {
         let _ = writeln!(text, "{start}- {part}");

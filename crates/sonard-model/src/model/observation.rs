@@ -14,7 +14,8 @@ use super::{
 };
 use crate::{
     acoustics::{
-        Detection, DetectorBank, EchoTrace, Incident, Latch, PulseArrival, Receiver, ReceiverNoise,
+        Detection, DetectorBank, EchoTrace, Incidence, Incident, Latch, PulseArrival, Receiver,
+        ReceiverNoise,
     },
     geometry::DVec2,
 };
@@ -60,6 +61,48 @@ impl<'a> ObservationPoint<'a> {
         detect: impl FnMut(&FiringArrivals) -> T,
     ) -> Result<T, TooCostly> {
         self.evaluate_needed(direction_rad, detect).map(|(result, _)| result)
+    }
+
+    /// Predicts the reading of a firing by a transducer at an offset (world, metres) from this point,
+    /// to the first order of the offset: its echo paths are those from this point, each shorter by
+    /// the part of the offset along its ends.
+    ///
+    /// That is exact for an echo that returns the way it came from plane walls, as long as they are
+    /// visible from both places, except for the absorption along the offset. Of other echoes, such as
+    /// those of corners, the angle from the axis of the beam is that at this point. The path of the
+    /// prediction's arrival begins at this point.
+    ///
+    /// # Errors
+    /// As [`Self::ping`].
+    pub fn ping_beside(&self, direction_rad: f64, offset: DVec2) -> Result<Prediction, TooCostly> {
+        let receiver = self.simulator.receiver();
+        let max_shift_m = 2.0 * offset.length();
+        let mut arrivals = Vec::with_capacity(USUAL_ARRIVALS);
+        self.at(direction_rad, |all| {
+            let (prediction, _) = all.nearest(|near| {
+                near.collect_arrivals(direction_rad, &mut arrivals);
+                let firing = DirectedArrivals { from: near, direction_rad };
+                for arrival in &mut arrivals {
+                    let Incidence { leaving_rad, arriving_rad, .. } =
+                        firing.incident(arrival).incidence;
+                    let ends = [leaving_rad, arriving_rad]
+                        .map(|end_rad| DVec2::from_angle(direction_rad + end_rad));
+                    let length_m = arrival.length_m - offset.dot(ends[0] + ends[1]);
+                    arrival.length_m = length_m.max(0.0);
+                }
+                arrivals.sort_by(|a, b| a.length_m.total_cmp(&b.length_m));
+                let incident = |arrival: &PulseArrival| {
+                    let mut incident = firing.incident(arrival);
+                    incident.incidence.length_m = arrival.length_m;
+                    Some(incident)
+                };
+                let known_m = near.reach_m - max_shift_m;
+                let (detection, needed_m) =
+                    receiver.detect_within(known_m, &arrivals, &incident, Latch::First, 0.0);
+                (firing.prediction(detection), needed_m.map(|length_m| length_m + max_shift_m))
+            })?;
+            Ok(prediction)
+        })
     }
 
     /// Predicts the reading of a firing whose receiver is re-armed after each echo, up to eight

@@ -1,6 +1,7 @@
 //! Tests of the engines: closed forms, laws, and the phenomena of Dudek, Jenkin, Milios and Wilkes.
 
 mod array;
+mod beside;
 mod closed_forms;
 mod crosstalk;
 mod extents;

@@ -55,7 +55,8 @@ const MAX_BOXES: usize = 3;
 const SHORT_M: f64 = 0.3;
 /// Maximum number of rounds.
 const MAX_ROUNDS: usize = 6;
-/// Share of all arcs unexplained from which a course may be wrong, and that of a coarse ranger.
+/// Share of all arcs unexplained from which a course may be wrong, and that of a coarse ranger or an
+/// array.
 const UNCERTAIN_SHARE: f64 = 0.2;
 const COARSE_UNCERTAIN_SHARE: f64 = 0.07;
 /// Gain of a round below which the last one is not repeated, nats.
@@ -194,7 +195,7 @@ impl<'a> SurveySearch<'a> {
     /// Returns `true` if more arcs are unexplained than in a plan whose poses are right.
     fn is_course_uncertain(&self) -> bool {
         let all: usize = self.workspace.arcs.iter().map(Vec::len).sum();
-        let share = match self.errors().is_coarse() {
+        let share = match self.errors().is_coarse() || self.workspace.is_array {
             true => COARSE_UNCERTAIN_SHARE,
             false => UNCERTAIN_SHARE,
         };

@@ -85,7 +85,7 @@ pub fn simulate_sweeps(
     Ok(found)
 }
 
-/// Simulates a round of an array from each pose, the robot standing still; its body is left out.
+/// Simulates a round of an array from each pose, at which the robot rests; its body is left out.
 ///
 /// # Errors
 /// Invalid sensor, or more paths than can be found.
