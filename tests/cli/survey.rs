@@ -22,9 +22,8 @@ fn path(folder: &Path, name: &str) -> String {
     folder.join(name).to_str().expect("a plain path").to_owned()
 }
 
-/// Logs of sweeps with a millimetre of noise, whose poses drift by centimetres and degrees, in a
-/// room with these cylinders.
-fn sweeps(folder: &Path, cylinders: &Value) -> Vec<String> {
+/// Scene of a room with these cylinders.
+fn room(folder: &Path, cylinders: &Value) -> String {
     let [w, d] = SIDES_M;
     let room = serde_json::json!({
         "name": "room", "materials": {"wall": {"reflectance": 0.97}}, "cylinders": cylinders.as_array().cloned().unwrap_or_default(),
@@ -32,22 +31,35 @@ fn sweeps(folder: &Path, cylinders: &Value) -> Vec<String> {
     });
     let scene = path(folder, "truth.json");
     fs::write(&scene, room.to_string()).expect("written");
+    scene
+}
+
+/// Logs of sweeps with a millimetre of noise, whose poses drift by centimetres and degrees, in a
+/// room with these cylinders.
+fn sweeps(folder: &Path, cylinders: &Value) -> Vec<String> {
+    let scene = room(folder, cylinders);
     let log = |(at, [x, y, heading]): (usize, &[f64; 3])| {
         let log = path(folder, &format!("{at}.jsonl"));
         let pose = format!("{x},{y},{heading}");
         let simulate = ["simulate", "--scene", &scene, "--pose", &pose, "-o", &log];
         succeeds(&[&simulate[..], &["--jitter-us", "6", "--max-range", "4"]].concat());
-        drift(&log, at as f64);
+        drift(&log, at as f64, 0.0);
         log
     };
     STOPS.iter().enumerate().map(log).collect()
 }
 
-/// Changes the pose in a log by an error that grows along the course.
-fn drift(log: &str, by: f64) {
+/// Changes the poses in a log by an error that grows along the course: by `by` at its first scan, and
+/// by `each` more at each further one.
+fn drift(log: &str, mut by: f64, each: f64) {
     let text = fs::read_to_string(log).expect("a log");
+    let mut scans = 0;
     let changed = text.lines().map(|line| {
         let mut record: Value = serde_json::from_str(line).expect("JSON");
+        if record["type"] == "scan_start" {
+            by += if scans == 0 { 0.0 } else { each };
+            scans += 1;
+        }
         if let Some(pose) = record.get_mut("pose").filter(|pose| pose.is_object()) {
             for (name, error) in [("x_m", 0.012), ("y_m", -0.009), ("heading_deg", 1.1)] {
                 let value = pose[name].as_f64().expect("a number");
@@ -56,7 +68,21 @@ fn drift(log: &str, by: f64) {
         }
         record.to_string() + "\n"
     });
-    fs::write(log, changed.collect::<String>()).expect("written");
+    let changed: String = changed.collect();
+    fs::write(log, changed).expect("written");
+}
+
+/// Asserts that the sides of the room are found, in any frame.
+fn assert_sides(survey: &Value, tolerance_m: f64) {
+    let walls = survey["walls"].as_array().expect("walls");
+    let mut lengths_m: Vec<f64> =
+        walls.iter().map(|wall| distance_m(&wall["from"]["at_m"], &wall["to"]["at_m"])).collect();
+    lengths_m.sort_by(f64::total_cmp);
+    let [w, d] = SIDES_M;
+    assert_eq!(lengths_m.len(), 4, "{lengths_m:?}");
+    for (found_m, expected_m) in lengths_m.iter().zip([d, d, w, w]) {
+        assert!((found_m - expected_m).abs() < tolerance_m, "{lengths_m:?}");
+    }
 }
 
 fn distance_m(a: &Value, b: &Value) -> f64 {
@@ -78,14 +104,7 @@ fn survey_reconstructs_room_and_course() {
     assert_eq!(survey["end"], "complete", "{survey}");
 
     // Lengths are independent of the frame, which is the drifting odometry's.
-    let walls = survey["walls"].as_array().expect("walls");
-    let mut lengths_m: Vec<f64> =
-        walls.iter().map(|wall| distance_m(&wall["from"]["at_m"], &wall["to"]["at_m"])).collect();
-    lengths_m.sort_by(f64::total_cmp);
-    let [w, d] = SIDES_M;
-    for (found_m, expected_m) in lengths_m.iter().zip([d, d, w, w]) {
-        assert!((found_m - expected_m).abs() < 0.001, "{lengths_m:?}");
-    }
+    assert_sides(&survey, 0.001);
     let poses: Vec<Value> = survey["poses"].as_array().expect("poses").clone();
     for (at, found) in poses.iter().enumerate() {
         for (other, to) in poses.iter().enumerate().skip(at + 1) {
@@ -358,13 +377,7 @@ fn survey_fits_the_ranger() {
 
 /// Log of a ring of rangers that moves through the room, whose poses drift by centimetres and degrees.
 fn ring_log(folder: &Path) -> String {
-    let [w, d] = SIDES_M;
-    let room = serde_json::json!({
-        "name": "room", "materials": {"wall": {"reflectance": 0.97}},
-        "walls": [{"id": "wall", "polyline": [[0, 0], [w, 0], [w, d], [0, d]], "closed": true, "material": "wall"}],
-    });
-    let (scene, course) = (path(folder, "ring-room.json"), path(folder, "course.csv"));
-    fs::write(&scene, room.to_string()).expect("written");
+    let (scene, course) = (room(folder, &Value::Null), path(folder, "course.csv"));
     let along = (0..7).map(|at| format!("{},0.7,0", 0.6 + 0.2 * f64::from(at)));
     let up = (0..6).map(|at| format!("1.9,{},90", 0.7 + 0.15 * f64::from(at)));
     let rows: Vec<String> =
@@ -373,20 +386,7 @@ fn ring_log(folder: &Path) -> String {
     let log = path(folder, "ring.jsonl");
     let simulate = ["simulate", "--array", "ring-12", "--scene", &scene, "--poses", &course];
     succeeds(&[&simulate[..], &["--max-range", "4", "-o", &log]].concat());
-    let text = fs::read_to_string(&log).expect("a log");
-    let mut scans = 0.0;
-    let drifted = text.lines().map(|line| {
-        let mut record: Value = serde_json::from_str(line).expect("JSON");
-        scans += f64::from(u8::from(record["type"] == "scan_start"));
-        if let Some(pose) = record.get_mut("pose").filter(|pose| pose.is_object()) {
-            for (name, error) in [("x_m", 0.004), ("y_m", -0.003), ("heading_deg", 0.4)] {
-                pose[name] = (pose[name].as_f64().expect("a number") + scans * error).into();
-            }
-        }
-        record.to_string() + "\n"
-    });
-    let drifted: String = drifted.collect();
-    fs::write(&log, drifted).expect("written");
+    drift(&log, 0.0, 0.35);
     log
 }
 
@@ -399,14 +399,7 @@ fn array_on_a_moving_robot_gives_the_room() {
     assert!(printed.contains("next view: none: it is computed for a ranger on a stepper only"));
     let text = fs::read_to_string(format!("{out}/survey.json")).expect("a survey");
     let survey: Value = serde_json::from_str(&text).expect("JSON");
-    let walls = survey["walls"].as_array().expect("walls");
-    let mut lengths_m: Vec<f64> =
-        walls.iter().map(|wall| distance_m(&wall["from"]["at_m"], &wall["to"]["at_m"])).collect();
-    lengths_m.sort_by(f64::total_cmp);
-    let [w, d] = SIDES_M;
-    for (found_m, expected_m) in lengths_m.iter().zip([d, d, w, w]) {
-        assert!((found_m - expected_m).abs() < 0.02, "{lengths_m:?}");
-    }
+    assert_sides(&survey, 0.02);
     // Of each reading a cause, in rounds of twelve.
     let causes = survey["causes"].as_array().expect("causes");
     assert!(

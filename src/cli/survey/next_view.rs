@@ -1,6 +1,6 @@
 //! Next view of a survey as text.
 
-use super::Course;
+use super::course::Course;
 use crate::survey::{NextView, OpenPart, ResolvedPart, Survey};
 
 /// Place and expected gain of the next view in a sentence, and one for each part that it resolves.
