@@ -59,9 +59,8 @@ impl ArrayRound {
             fired.push(ranger);
             let Some(outcome) = FiringOutcome::of_ping(ping, tof_us_per_m) else { continue };
             if let Some(round) = rounds.last_mut() {
-                let to_frame = DVec2::from_angle(-round.pose.heading_deg.to_radians());
                 round.firings.push(ArrayFiring {
-                    position: to_frame.rotate(viewpoint.position() - round.pose.position()),
+                    position: round.pose.point_in_frame(viewpoint.position()),
                     azimuth_deg: wrap_180(viewpoint.direction_deg - round.pose.heading_deg),
                     outcome,
                 });

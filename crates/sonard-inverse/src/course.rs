@@ -119,15 +119,14 @@ impl Tracker {
         else {
             return Vec::new();
         };
-        let driven = DVec2::from_angle(-then.heading_deg.to_radians())
-            .rotate(now.position() - then.position());
+        let driven = then.point_in_frame(now.position());
         let turned_deg = wrap_180(now.heading_deg - then.heading_deg);
         modes.iter().map(|mode| self.moved(mode, driven, turned_deg)).collect()
     }
 
     fn moved(&self, mode: &PoseMode, driven: DVec2, turned_deg: f64) -> PredictedPose {
         let distance_m = driven.length();
-        let to = DVec2::from_angle(mode.heading_deg.to_radians()).rotate(driven);
+        let to = mode.pose().rotate_to_world(driven);
         let pose = Pose {
             x_m: mode.x_m + to.x,
             y_m: mode.y_m + to.y,

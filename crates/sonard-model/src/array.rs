@@ -88,8 +88,7 @@ impl MountedRanger {
     /// World pose of the ranger on a robot at a pose.
     #[must_use]
     pub fn world_pose(&self, robot: &Pose) -> Pose {
-        let turn = DVec2::from_angle(robot.direction_rad(0.0));
-        let place = robot.position() + turn.rotate(DVec2::new(self.x_m, self.y_m));
+        let place = robot.position() + robot.rotate_to_world(DVec2::new(self.x_m, self.y_m));
         let heading_deg = robot.heading_deg + self.bearing_deg;
         Pose { x_m: place.x, y_m: place.y, heading_deg }
     }

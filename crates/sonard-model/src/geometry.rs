@@ -47,6 +47,18 @@ impl Pose {
     pub fn point_at(&self, azimuth_deg: f64, range_m: f64) -> DVec2 {
         self.position() + range_m * DVec2::from_angle(self.direction_rad(azimuth_deg))
     }
+
+    /// Vector of the frame of the pose (x ahead, y to the left) along the axes of the world.
+    #[must_use]
+    pub fn rotate_to_world(&self, vector: DVec2) -> DVec2 {
+        DVec2::from_angle(self.heading_deg.to_radians()).rotate(vector)
+    }
+
+    /// Point of the world in the frame of the pose (x ahead, y to the left), metres.
+    #[must_use]
+    pub fn point_in_frame(&self, point: DVec2) -> DVec2 {
+        DVec2::from_angle(-self.heading_deg.to_radians()).rotate(point - self.position())
+    }
 }
 
 /// Signed angle from one direction to another, radians in [-pi, pi], counter-clockwise positive.

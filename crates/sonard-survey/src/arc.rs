@@ -45,12 +45,12 @@ impl Arc {
 
     /// Position of the transducer from that of the pose, along the axes of the world, metres.
     pub(crate) fn face_of(&self, pose: &Pose) -> DVec2 {
-        DVec2::from_angle(pose.heading_deg.to_radians()).rotate(self.face)
+        pose.rotate_to_world(self.face)
     }
 
     /// Point at a range along the middle, metres.
     pub(crate) fn point_at(&self, pose: &Pose, range_m: f64) -> DVec2 {
-        self.place(pose) + range_m * DVec2::from_angle(pose.direction_rad(self.azimuth_deg))
+        pose.point_at(self.azimuth_deg, range_m) + self.face_of(pose)
     }
 
     /// Standard deviation of the azimuth, degrees.

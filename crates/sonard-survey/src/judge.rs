@@ -337,7 +337,7 @@ fn predict(simulator: &Simulator, readings: &Readings, pose: &Pose) -> Option<Ve
         if beam.face == DVec2::ZERO {
             return point.ping(direction_rad).ok();
         }
-        let face = DVec2::from_angle(pose.heading_deg.to_radians()).rotate(beam.face);
+        let face = pose.rotate_to_world(beam.face);
         let mut prediction = point.ping_beside(direction_rad, face).ok()?;
         if prediction.range_m.is_some_and(|range_m| range_m > readings.max_range_m) {
             (prediction.status, prediction.range_m) = (PingStatus::NoEcho, None);

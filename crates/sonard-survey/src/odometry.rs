@@ -127,8 +127,7 @@ pub(crate) fn in_frame_of_first(poses: &[Pose], start: &Pose) -> Vec<Pose> {
 
 /// Displacement from a pose to a point, in the frame of the pose if `is_turned`.
 fn displacement(pose: &Pose, point: DVec2, is_turned: bool) -> DVec2 {
-    let turn = if is_turned { DVec2::from_angle(-pose.heading_deg.to_radians()) } else { DVec2::X };
-    turn.rotate(point - pose.position())
+    if is_turned { pose.point_in_frame(point) } else { point - pose.position() }
 }
 
 #[cfg(test)]

@@ -43,8 +43,8 @@ const SEARCH_SHARE: f64 = 0.7;
 /// independent of the number of threads.
 ///
 /// Rounds of an array are predicted from the pose of the robot, to the first order of the offsets of
-/// the transducers: exactly for echoes of plane walls, without the change of strength with range. No
-/// numbers are fitted to them, and the result has no next view.
+/// the transducers ([`ping_beside`](sonard_model::model::ObservationPoint::ping_beside)). No numbers
+/// are fitted to them, and the result has no next view.
 ///
 /// # Errors
 /// Fewer than two sweeps or rounds, a sweep without arcs, numbers to fit for an array, or an invalid

@@ -84,7 +84,6 @@ fn echoes(input: &Input, found: &Survey) -> Vec<(DVec2, EchoCause)> {
     let beams = input.course.beams(input.world.air.sound_speed_m_s());
     let mut echoes = Vec::new();
     for ((beams, of), causes) in beams.into_iter().zip(&found.poses).zip(&found.causes) {
-        let frame = DVec2::from_angle(of.pose.heading_deg.to_radians());
         for ((position, azimuth_deg, range_m), cause) in beams.into_iter().zip(causes) {
             let cause = match cause {
                 ReadingCause::First => EchoCause::First,
@@ -95,7 +94,7 @@ fn echoes(input: &Input, found: &Survey) -> Vec<(DVec2, EchoCause)> {
             };
             if let Some(range_m) = range_m {
                 let from_axis = of.pose.point_at(azimuth_deg, range_m);
-                echoes.push((from_axis + frame.rotate(position), cause));
+                echoes.push((from_axis + of.pose.rotate_to_world(position), cause));
             }
         }
     }

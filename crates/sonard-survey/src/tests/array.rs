@@ -95,7 +95,7 @@ fn bundle_recovers_poses_from_transducers_off_the_axis() {
     let faces = [[0.16, 0.0], [0.05, 0.15], [-0.1, 0.12]].map(DVec2::from);
     let arc = |sweep: usize, feature: &VirtualFeature, face: DVec2| {
         let pose = &truth[sweep];
-        let place = pose.position() + DVec2::from_angle(pose.heading_deg.to_radians()).rotate(face);
+        let place = pose.position() + pose.rotate_to_world(face);
         let (range_m, bearing_rad) = feature.predict(place);
         RangeArc {
             sweep,

@@ -319,14 +319,13 @@ pub fn drift(poses: &[Pose], per_m: [f64; 2], random: &mut impl Rng) -> Vec<Pose
     let Some(first) = poses.first() else { return Vec::new() };
     let mut odometry = vec![*first];
     for pair in poses.windows(2) {
-        let frame = DVec2::from_angle(-pair[0].heading_deg.to_radians());
-        let moved = frame.rotate(pair[1].position() - pair[0].position());
+        let moved = pair[0].point_in_frame(pair[1].position());
         let length_m = moved.length();
         let error = DVec2::new(normal(random), normal(random)) * per_m[0] * length_m;
         let turn_deg =
             pair[1].heading_deg - pair[0].heading_deg + per_m[1] * length_m * normal(random);
         let from = odometry[odometry.len() - 1];
-        let by = DVec2::from_angle(from.heading_deg.to_radians()).rotate(moved + error);
+        let by = from.rotate_to_world(moved + error);
         odometry.push(Pose {
             x_m: from.x_m + by.x,
             y_m: from.y_m + by.y,
