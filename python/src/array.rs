@@ -19,7 +19,7 @@ use pyo3::{
 use sonard_model::array;
 
 pub(crate) use course::Course;
-pub(crate) use model::ArrayModel;
+pub(crate) use model::{ArrayModel, own_sensor};
 
 use crate::{
     arrays::{self, PoseArray},
@@ -209,7 +209,7 @@ impl RangerArray {
 }
 
 /// Resolves a `RangerArray` or the name of a preset.
-fn resolve(given: &Bound<'_, PyAny>) -> PyResult<Py<RangerArray>> {
+pub(crate) fn resolve(given: &Bound<'_, PyAny>) -> PyResult<Py<RangerArray>> {
     if let Ok(array) = given.cast::<RangerArray>() {
         return Ok(array.clone().unbind());
     }

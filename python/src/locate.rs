@@ -144,8 +144,8 @@ impl Locator {
             return inverse::FitSweep::from_scan(scan.get().view())
                 .map_err(|error| new_error::<LogError>(py, &error.to_string(), ""));
         }
-        let given = BeamReadings::from_python(readings, azimuths_deg)?;
-        let beams = given.firings(self.world.air.sound_speed_m_s());
+        let given = BeamReadings::from_python(readings)?;
+        let beams = given.firings(azimuths_deg, self.world.air.sound_speed_m_s())?;
         if beams.len() < MIN_BEAMS {
             return Err(PyValueError::new_err(format!(
                 "{} usable readings: at least {MIN_BEAMS} are required",

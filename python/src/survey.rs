@@ -11,17 +11,22 @@ use std::{
 
 use pyo3::{exceptions::PyValueError, prelude::*, types::PyTuple};
 use sonard::{
-    inverse::{FitSweep, World},
+    inverse::{ArrayFiring, ArrayRound, FiringOutcome, FitSweep, World},
     survey::{
-        OdometrySigma, Survey, SurveyError, SurveyObserver, SurveyOptions, SurveyProgress,
-        unknown_room,
+        OdometrySigma, Survey, SurveyCourse, SurveyError, SurveyObserver, SurveyOptions,
+        SurveyProgress, unknown_room,
     },
 };
-use sonard_model::{acoustics, geometry::Pose, model::Options};
+use sonard_model::{
+    acoustics, array as model_array,
+    geometry::{DVec2, Pose},
+    model::Options,
+};
 use uuid::Uuid;
 
 use crate::{
     air::Air,
+    array,
     arrays::PoseArray,
     error::{LogError, SonardError, new_error},
     json,
@@ -37,23 +42,29 @@ use crate::{
 /// Interval between checks for interrupts.
 const INTERRUPT_INTERVAL: Duration = Duration::from_millis(50);
 
-/// Reconstructs an unknown room and the poses of sweeps, as ``sonard survey`` does.
+/// Reconstructs an unknown room and the poses of sweeps, or of an array on a moving robot, as
+/// ``sonard survey`` does.
 ///
 /// Parameters
 /// ----------
 /// sweeps : Log, Scan, sequence of them, or array_like of shape (sweeps, beams)
 ///     Full turns of a ranger at two places or more, in the order of the course: scans of logs,
 ///     readings as returned by ``Model.predict``, or ranges in metres, with ``inf`` for no echo and
-///     ``nan`` for a missing measurement. Unusable scans are skipped with a warning.
+///     ``nan`` for a missing measurement. Unusable scans are skipped with a warning. Or scans of an
+///     array on a moving robot; or, with ``array``, its rounds, of shape (rounds, firings) in the
+///     order of ``array.round``, as returned by ``ArrayModel.predict``.
 /// poses : array_like, shape (sweeps, 3), optional
 ///     Poses by odometry: x and y (metres) and heading (degrees). The first one is the frame of the
-///     result. Default to those of the scans; required for arrays, unless ``odometry`` is ``None``.
+///     result. Default to those of the scans, and must be omitted for scans of an array; required
+///     for ndarrays, unless ``odometry`` is ``None``.
+/// array : RangerArray or str, optional
+///     Array that took the rounds, or the name of a preset; must be omitted for scans.
 /// azimuths_deg : array_like, shape (beams,), optional
-///     Azimuths of the beams of an array, degrees. Default to 400 azimuths from 0 to 359.1.
+///     Azimuths of the beams of an ndarray, degrees. Default to 400 azimuths from 0 to 359.1.
 /// sensor : Sensor or str, optional
-///     Defaults to that of the scans, for arrays to ``"senscomp-6500"``.
+///     Defaults to that of the scans or of ``array``, else to ``"senscomp-6500"``.
 /// air : Air, optional
-///     Defaults to that of the scans, for arrays to 20 degrees.
+///     Defaults to that of the scans, for ndarrays to 20 degrees.
 /// odometry : tuple of float, optional
 ///     Standard deviations of the poses per metre driven: of the position (metres) and of the
 ///     heading (degrees). ``None`` ignores the poses.
@@ -67,6 +78,9 @@ const INTERRUPT_INTERVAL: Duration = Duration::from_millis(50);
 ///     Numbers of sensor and air to fit together with the plan: ``"threshold"``, ``"rise"`` (of the
 ///     threshold with range), ``"mounting"``, ``"materials"`` (the reflectance), ``"air"`` (speed
 ///     of sound), ``"delay"``, ``"gear"``, ``"beam"``, ``"skirts"``, ``"pulse"``.
+/// round_spacing_m : float
+///     Minimum distance between rounds of a logged array that are used, metres, 0 to 5, unless the
+///     robot turns by 5 degrees. A survey takes 200 rounds at most.
 /// view_reach_m : float
 ///     Maximum distance of the next view from a stop, metres, 0 to 20.
 /// max_scenes : int
@@ -91,14 +105,16 @@ const INTERRUPT_INTERVAL: Duration = Duration::from_millis(50);
 ///     If no scan can be used, or the scans differ in sensor.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "they are keywords where they are used")]
-#[pyo3(signature = (sweeps, poses = None, *, azimuths_deg = None, sensor = None, air = None,
-    odometry = Some((0.05, 5.0)), square = false, max_range_m = 5.0, reflectance = 0.97, fit = Vec::new(), view_reach_m = 1.5, max_scenes = 60_000,
+#[pyo3(signature = (sweeps, poses = None, *, array = None, azimuths_deg = None, sensor = None, air = None,
+    odometry = Some((0.05, 5.0)), square = false, max_range_m = 5.0, reflectance = 0.97, fit = Vec::new(),
+    round_spacing_m = SurveyCourse::ROUND_SPACING_M, view_reach_m = 1.5, max_scenes = 60_000,
     closed = false, progress = None),
-    text_signature = "(sweeps, poses=None, *, azimuths_deg=None, sensor=None, air=None, odometry=(0.05, 5.0), square=False, max_range_m=5.0, reflectance=0.97, fit=(), view_reach_m=1.5, max_scenes=60000, closed=False, progress=None)")]
+    text_signature = "(sweeps, poses=None, *, array=None, azimuths_deg=None, sensor=None, air=None, odometry=(0.05, 5.0), square=False, max_range_m=5.0, reflectance=0.97, fit=(), round_spacing_m=0.1, view_reach_m=1.5, max_scenes=60000, closed=False, progress=None)")]
 pub(crate) fn survey<'py>(
     py: Python<'py>,
     sweeps: &Bound<'py, PyAny>,
     poses: Option<&Bound<'py, PyAny>>,
+    array: Option<&Bound<'py, PyAny>>,
     azimuths_deg: Option<&Bound<'py, PyAny>>,
     sensor: Option<&Bound<'py, PyAny>>,
     air: Option<&Bound<'py, Air>>,
@@ -107,6 +123,7 @@ pub(crate) fn survey<'py>(
     max_range_m: f64,
     reflectance: f64,
     fit: Vec<String>,
+    round_spacing_m: f64,
     view_reach_m: f64,
     max_scenes: i64,
     closed: bool,
@@ -130,15 +147,27 @@ pub(crate) fn survey<'py>(
         max_scenes,
         ..SurveyOptions::default()
     };
-    let mut given = Given { poses: None, azimuths_deg, sensor: None, air: None, max_range_m };
+    if !(0.0..=5.0).contains(&round_spacing_m) {
+        let message = format!("round_spacing_m is {round_spacing_m}: it must be from 0 to 5");
+        return Err(PyValueError::new_err(message));
+    }
+    let mut given = Given {
+        poses: None,
+        array: array.map(array::resolve).transpose()?,
+        azimuths_deg,
+        sensor: None,
+        air: None,
+        max_range_m,
+        round_spacing_m,
+    };
     given.air = air.map(|air| *air.get());
     given.poses = poses.map(PoseArray::from_python).transpose()?;
     given.sensor = sensor.map(sensor::resolve).transpose()?;
-    let (world, sweeps) = match given.is_of_logs(sweeps)? {
+    let (world, course) = match given.is_of_logs(sweeps)? {
         true => given.logged(py, sweeps)?,
         false => given.measured(sweeps, odometry.is_some())?,
     };
-    let found = find(py, &world, &sweeps, &options, progress)?;
+    let found = find(py, &world, &course, &options, progress)?;
     let scene = found.scene("survey", closed);
     scene.build().map_err(|error| {
         let message = format!("the survey found no walls: {error}");
@@ -154,10 +183,12 @@ pub(crate) fn survey<'py>(
 /// Arguments that describe the sweeps.
 struct Given<'a, 'py> {
     poses: Option<PoseArray>,
+    array: Option<Py<array::RangerArray>>,
     azimuths_deg: Option<&'a Bound<'py, PyAny>>,
     sensor: Option<Py<sensor::Sensor>>,
     air: Option<Air>,
     max_range_m: f64,
+    round_spacing_m: f64,
 }
 
 impl<'py> Given<'_, 'py> {
@@ -172,33 +203,54 @@ impl<'py> Given<'_, 'py> {
         Ok(is_logged(sweeps) || is_list && (sweeps.len()? == 0 || is_logged(&first()?)))
     }
 
-    /// World and sweeps of scans.
+    /// World and readings of scans.
     fn logged(
         &self,
         py: Python<'py>,
         scans: &Bound<'py, PyAny>,
-    ) -> PyResult<(World, Vec<FitSweep>)> {
-        if self.azimuths_deg.is_some() {
-            return Err(PyValueError::new_err("azimuths_deg must be omitted for scans"));
+    ) -> PyResult<(World, SurveyCourse)> {
+        let given =
+            [("azimuths_deg", self.azimuths_deg.is_some()), ("array", self.array.is_some())];
+        if let Some((name, _)) = given.iter().find(|(_, is_given)| *is_given) {
+            return Err(PyValueError::new_err(format!("{name} must be omitted for scans")));
         }
         let scans = scans_of(scans)?;
         self.check_poses(py, scans.len())?;
-        let mut used: Vec<(&Scan, FitSweep)> = Vec::new();
+        let mut used: Vec<&Scan> = Vec::new();
+        let mut course: Option<SurveyCourse> = None;
         for (at, scan) in scans.iter().map(Py::get).enumerate() {
-            match FitSweep::from_scan(scan.view()) {
-                Ok(sweep) => {
-                    let pose = self.poses.as_ref().map_or(sweep.pose, |poses| poses.list[at]);
-                    used.push((scan, FitSweep { pose, ..sweep }));
+            let mut found = match SurveyCourse::from_scan(scan.view()) {
+                Ok(found) => found,
+                Err(error) => {
+                    warn(py, &format!("{error}; scan skipped"))?;
+                    continue;
                 }
-                Err(error) => warn(py, &format!("{error}; scan skipped"))?,
+            };
+            match (&mut found, &self.poses) {
+                (_, None) => {}
+                (SurveyCourse::Sweeps(sweeps), Some(poses)) => {
+                    sweeps.iter_mut().for_each(|sweep| sweep.pose = poses.list[at]);
+                }
+                (SurveyCourse::Rounds(_), Some(_)) => {
+                    let message = "poses must be omitted for scans of an array, which have one in each reading";
+                    return Err(PyValueError::new_err(message));
+                }
+            }
+            used.push(scan);
+            match &mut course {
+                None => course = Some(found),
+                Some(course) => {
+                    course.extend(found).map_err(|error| survey_error(py, &[], &error))?;
+                }
             }
         }
-        let Some((first, _)) = used.first() else {
-            let help = "pass scans of a ranger on a stepper";
+        let (Some(first), Some(mut course)) = (used.first(), course) else {
+            let help = "pass scans of a ranger on a stepper, or of an array on a moving robot";
             return Err(new_error::<LogError>(py, "no sweep to survey", help));
         };
+        course.thin(self.round_spacing_m);
         let session = first.session_of(py)?;
-        for (scan, _) in &used {
+        for scan in &used {
             if self.sensor.is_none() && scan.session_of(py)?.sensor != session.sensor {
                 let help = "survey the scans of one sensor together, or pass a sensor";
                 return Err(new_error::<LogError>(py, "the scans have different sensors", help));
@@ -213,15 +265,15 @@ impl<'py> Given<'_, 'py> {
             None => first.air(py)?.air,
         };
         let world = self.world(py, sensor, air, first.options(py)?)?;
-        Ok((world, used.into_iter().map(|(_, sweep)| sweep).collect()))
+        Ok((world, course))
     }
 
-    /// World and sweeps of an array, or of a sequence of arrays.
+    /// World and readings of an ndarray, or of a sequence of them.
     fn measured(
         &self,
         sweeps: &Bound<'py, PyAny>,
         has_odometry: bool,
-    ) -> PyResult<(World, Vec<FitSweep>)> {
+    ) -> PyResult<(World, SurveyCourse)> {
         let py = sweeps.py();
         let Ok(rows) = sweeps.try_iter() else {
             let kind = sweeps.get_type();
@@ -236,22 +288,41 @@ impl<'py> Given<'_, 'py> {
             ));
         }
         self.check_poses(py, rows.len())?;
-        let sensor = match &self.sensor {
-            Some(sensor) => sensor.clone_ref(py),
-            None => sensor::default(py)?,
+        let sensor = match (&self.sensor, &self.array) {
+            (Some(sensor), _) => sensor.clone_ref(py),
+            (None, Some(array)) => Py::new(py, array::own_sensor(py, &array.get().array.sensor)?)?,
+            (None, None) => sensor::default(py)?,
         };
         let air = self.air.map_or_else(acoustics::Air::default, |air| air.air);
         let world = self.world(py, sensor.get().sensor.clone(), air, Options::default())?;
-        let mut found = Vec::with_capacity(rows.len());
-        for (at, row) in rows.iter().enumerate() {
-            let readings = BeamReadings::from_python(row, self.azimuths_deg)
-                .map_err(|error| in_sweep(py, at, &error))?;
-            let origin = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
-            let pose = self.poses.as_ref().map_or(origin, |poses| poses.list[at]);
-            let beams = readings.firings(air.sound_speed_m_s());
-            found.push(FitSweep { scan: Uuid::from_u128(at as u128), pose, beams });
+        let origin = Pose { x_m: 0.0, y_m: 0.0, heading_deg: 0.0 };
+        let pose = |at: usize| self.poses.as_ref().map_or(origin, |poses| poses.list[at]);
+        let scan = |at: usize| Uuid::from_u128(at as u128);
+        let sound_speed_m_s = air.sound_speed_m_s();
+        let numbered = rows.iter().enumerate();
+        if let Some(array) = &self.array {
+            if self.azimuths_deg.is_some() {
+                let message =
+                    "azimuths_deg must be omitted with an array, which has its directions";
+                return Err(PyValueError::new_err(message));
+            }
+            let array = &array.get().array;
+            let round = |(at, row): (usize, &Bound<'py, PyAny>)| {
+                let firings = array_firings(array, row, sound_speed_m_s);
+                let firings = firings.map_err(|error| in_sweep(py, at, &error))?;
+                Ok(ArrayRound { scan: scan(at), pose: pose(at), firings })
+            };
+            let rounds = numbered.map(round).collect::<PyResult<_>>()?;
+            return Ok((world, SurveyCourse::Rounds(rounds)));
         }
-        Ok((world, found))
+        let sweep = |(at, row): (usize, &Bound<'py, PyAny>)| {
+            let beams = BeamReadings::from_python(row)
+                .and_then(|readings| readings.firings(self.azimuths_deg, sound_speed_m_s));
+            let beams = beams.map_err(|error| in_sweep(py, at, &error))?;
+            Ok(FitSweep { scan: scan(at), pose: pose(at), beams })
+        };
+        let sweeps = numbered.map(sweep).collect::<PyResult<_>>()?;
+        Ok((world, SurveyCourse::Sweeps(sweeps)))
     }
 
     fn world(
@@ -286,6 +357,32 @@ impl<'py> Given<'_, 'py> {
     }
 }
 
+/// Firings of a round, given in the order of firing; without those that have no outcome.
+fn array_firings(
+    array: &model_array::RangerArray,
+    row: &Bound<'_, PyAny>,
+    sound_speed_m_s: f64,
+) -> PyResult<Vec<ArrayFiring>> {
+    let readings = BeamReadings::from_python(row)?;
+    let order: Vec<usize> = array.round().collect();
+    if order.len() != readings.len() {
+        return Err(PyValueError::new_err(format!(
+            "{} readings, but a round of the array has {} firings",
+            readings.len(),
+            order.len()
+        )));
+    }
+    let firing = |(at, outcome): (usize, Option<FiringOutcome>)| {
+        let ranger = &array.rangers[at];
+        Some(ArrayFiring {
+            position: DVec2::new(ranger.x_m, ranger.y_m),
+            azimuth_deg: ranger.azimuth_deg(),
+            outcome: outcome?,
+        })
+    };
+    Ok(order.into_iter().zip(readings.outcomes(sound_speed_m_s)).filter_map(firing).collect())
+}
+
 /// Adds the index of a sweep to an error in its readings.
 fn in_sweep(py: Python<'_>, at: usize, error: &PyErr) -> PyErr {
     PyValueError::new_err(format!("sweeps[{at}]: {}", error.value(py)))
@@ -300,6 +397,10 @@ fn survey_error(py: Python<'_>, sweeps: &[FitSweep], error: &SurveyError) -> PyE
             (message, "leave this sweep out, or raise max_range_m")
         }
         SurveyError::TooFewSweeps(_) => (error.to_string(), ""),
+        SurveyError::MixedCourse => (error.to_string(), "survey them separately"),
+        SurveyError::TooManyRounds { .. } => {
+            (error.to_string(), "pass fewer rounds, or raise round_spacing_m")
+        }
         SurveyError::Option { name, value, expected } => {
             let name = match *name {
                 "m_per_m" => "odometry[0]",
@@ -311,7 +412,7 @@ fn survey_error(py: Python<'_>, sweeps: &[FitSweep], error: &SurveyError) -> PyE
         SurveyError::World(_) | SurveyError::Scene(_) => {
             (error.to_string(), "check sensor, air and max_range_m")
         }
-        SurveyError::Group(_) | SurveyError::NotFittable { .. } | SurveyError::FitOfArray => {
+        SurveyError::Group(_) | SurveyError::NotFittable { .. } => {
             (error.to_string(), "poses, walls and posts are estimated in any case")
         }
     };
@@ -322,7 +423,7 @@ fn survey_error(py: Python<'_>, sweeps: &[FitSweep], error: &SurveyError) -> PyE
 fn find(
     py: Python<'_>,
     world: &World,
-    sweeps: &[FitSweep],
+    course: &SurveyCourse,
     options: &SurveyOptions,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Survey> {
@@ -335,7 +436,7 @@ fn find(
             let working = scope.spawn(move || {
                 // The channel closes when the search ends.
                 let observer = observer;
-                pool.install(|| sonard::survey::survey(world, sweeps, options, &observer))
+                pool.install(|| sonard::survey::survey(world, course, options, &observer))
             });
             let watched = watch(&receiver, progress.as_ref(), is_cancelled);
             (working.join(), watched)
@@ -343,6 +444,10 @@ fn find(
     });
     watched?;
     let found = found.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+    let sweeps = match course {
+        SurveyCourse::Sweeps(sweeps) => sweeps.as_slice(),
+        SurveyCourse::Rounds(_) => &[],
+    };
     found.map_err(|error| survey_error(py, sweeps, &error))
 }
 

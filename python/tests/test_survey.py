@@ -107,6 +107,47 @@ def test_matches_command(command: Command, tmp_path: Path) -> None:
     assert found.scene == sonard.Scene.load(tmp_path / "out/scene.json")
 
 
+def test_array_on_a_moving_robot(command: Command, tmp_path: Path) -> None:
+    along = np.column_stack([np.linspace(0.6, 1.8, 7), np.full(7, 0.7), np.zeros(7)])
+    up = np.column_stack([np.full(6, 1.9), 0.7 + 0.15 * np.arange(6), np.full(6, 90.0)])
+    poses = np.vstack([along, up])
+    odometry = poses + np.outer(np.arange(13), [0.004, -0.003, 0.3])
+    model = sonard.ArrayModel(ROOM, "ring-12", max_range_m=4.0)
+    rounds = model.predict(poses)
+    found = sonard.survey(rounds, odometry, array="ring-12", max_range_m=4.0)
+    np.testing.assert_allclose(sorted(wall.length_m() for wall in found.walls), [2.3, 2.3, 2.8, 2.8], atol=0.01)
+    np.testing.assert_allclose(found.poses, poses, atol=0.6)
+    np.testing.assert_allclose(found.poses[:, :2], poses[:, :2], atol=0.01)
+    assert [len(causes) for causes in found.causes] == [12] * 13 and found.next_view is None
+    # Bare ranges in the order of the firings, as measured by a robot.
+    ranges = np.where(rounds["status"] == sonard.Status.ECHO, rounds["range_m"], np.inf)
+    again = sonard.survey(ranges, odometry, array=model.array, sensor=model.sensor, max_range_m=4.0)
+    assert again.end == found.end and len(again.walls) == 4
+
+    # Scans of a log give what the command gives.
+    scene, course, log = (tmp_path / name for name in ("room.json", "course.csv", "ring.jsonl"))
+    scene.write_text(ROOM.to_json())
+    np.savetxt(course, poses, delimiter=",", header="x_m,y_m,heading_deg", comments="")
+    command("simulate", "--array", "ring-12", "--scene", scene, "--poses", course, "--max-range", 4, "-o", log)
+    (listed,) = command("survey", log, "--max-range", 4, "--round-spacing", 0.3, "--json", "--out", tmp_path / "out")
+    logged = sonard.survey(sonard.read_log(log), max_range_m=4.0, round_spacing_m=0.3)
+    assert len(logged.poses) == len(listed["poses"]) == 7 and logged.score == listed["score"]
+
+    with pytest.raises(ValueError, match="poses must be omitted for scans of an array"):
+        sonard.survey(sonard.read_log(log), np.zeros((len(sonard.read_log(log)), 3)))
+    for words, arguments, options in [
+        ("array must be omitted for scans", (sonard.read_log(log),), {"array": "ring-12"}),
+        ("azimuths_deg must be omitted with an array", (rounds, odometry), {"array": "ring-12", "azimuths_deg": [0.0]}),
+        ("sweeps[0]: 11 readings, but a round of the array has 12 firings", (rounds[:, :11], odometry), {"array": "ring-12"}),
+        ("round_spacing_m is 9.0: it must be from 0 to 5", (rounds, odometry), {"array": "ring-12", "round_spacing_m": 9.0}),
+    ]:
+        with pytest.raises(ValueError) as caught:
+            sonard.survey(*arguments, **options)
+        assert words in str(caught.value)
+    with pytest.raises(sonard.SonardError, match="201 rounds of the array: a survey takes 200 at most"):
+        sonard.survey(np.ones((201, 12)), np.zeros((201, 3)), array="ring-12")
+
+
 def test_ranges_and_progress(sweeps: NDArray[np.void], found: sonard.Survey) -> None:
     steps: list[dict[str, Any]] = []
     again = sonard.survey(sweeps["range_m"], ODOMETRY, max_range_m=4.0, progress=steps.append)
@@ -192,7 +233,7 @@ def test_error_messages(sweeps: NDArray[np.void]) -> None:
     silent[2] = np.inf
     cases: list[tuple[type[Exception], str, tuple[Any, ...], dict[str, Any]]] = [
         (sonard.SonardError, "too few sweeps (1): a survey needs at least 2", (sweeps[:1], ODOMETRY[:1]), {}),
-        (sonard.LogError, "no sweep to survey: pass scans of a ranger on a stepper", ([],), {}),
+        (sonard.LogError, "no sweep to survey: pass scans of a ranger on a stepper, or of an array", ([],), {}),
         (sonard.SonardError, "sweeps[2] has no arc of equal ranges", (silent, ODOMETRY), {}),
         (sonard.SonardError, "leave this sweep out, or raise max_range_m", (sweeps, ODOMETRY), {"max_range_m": 0.3}),
         (ValueError, "poses[1]: values must be finite", (sweeps, nan), {}),

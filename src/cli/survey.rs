@@ -11,8 +11,6 @@ use std::{path::PathBuf, sync::Arc};
 
 use indicatif::ProgressBar;
 
-use course::Course;
-
 use super::{
     Failure, Outcome,
     answer::print_result,
@@ -28,8 +26,8 @@ use crate::{
     inverse::{ParameterGroup, World},
     scan::{Provenance, Session},
     survey::{
-        OdometrySigma, PlanScores, SearchEnd, Survey, SurveyError, SurveyObserver, SurveyOptions,
-        SurveyProgress, SurveyStage, resume_survey, unknown_room,
+        OdometrySigma, PlanScores, SearchEnd, Survey, SurveyCourse, SurveyError, SurveyObserver,
+        SurveyOptions, SurveyProgress, SurveyStage, resume_survey, unknown_room,
     },
 };
 
@@ -80,7 +78,8 @@ pub(super) struct Args {
     view_reach: f64,
     /// Minimum distance between rounds of an array that are used, metres, unless the robot turns by
     /// 5 degrees
-    #[arg(long, value_name = "M", default_value_t = 0.1, value_parser = within(0.0..=5.0))]
+    #[arg(long, value_name = "M", default_value_t = SurveyCourse::ROUND_SPACING_M,
+          value_parser = within(0.0..=5.0))]
     round_spacing: f64,
     /// Budget of the search: maximum number of floor plans whose readings are predicted
     #[arg(long, value_name = "N", default_value_t = SurveyOptions::default().max_scenes,
@@ -136,7 +135,7 @@ Exit codes: 0 done, 1 ended early (interrupted, or the budget is spent), 2 wrong
 
 /// Readings of the logs and what they share.
 struct Input {
-    course: Course,
+    course: SurveyCourse,
     world: World,
     provenances: Vec<Provenance>,
 }
@@ -215,7 +214,7 @@ fn read(args: &Args, what_if: &WhatIf) -> Result<Input, Failure> {
     for log in &logs_in(&args.logs)? {
         for_each_scan(log, |mut scan| {
             assumptions.apply(&mut scan);
-            let found = match Course::from_scan(&scan) {
+            let found = match SurveyCourse::from_scan(&scan) {
                 Ok(found) => found,
                 Err(error) => {
                     notice!("warning: {}: {error}; scan skipped", log.display());
@@ -243,14 +242,9 @@ fn read(args: &Args, what_if: &WhatIf) -> Result<Input, Failure> {
                             "survey scans of one sensor together, or override it with --sensor",
                         ));
                     }
-                    input.course.extend(found).ok_or_else(|| {
-                        Failure::input(
-                            format!(
-                                "{}: scans of an array and of a ranger on a stepper",
-                                log.display()
-                            ),
-                            "survey them separately",
-                        )
+                    input.course.extend(found).map_err(|error| {
+                        let error = format!("{}: {error}", log.display());
+                        Failure::input(error, "survey them separately")
                     })?;
                     input.provenances.push(session.provenance);
                 }
@@ -265,17 +259,8 @@ fn read(args: &Args, what_if: &WhatIf) -> Result<Input, Failure> {
         ));
     };
     input.course.thin(args.round_spacing);
-    match &input.course {
-        Course::Rounds(rounds) if rounds.len() > MAX_ROUNDS => Err(Failure::input(
-            format!("{} rounds of the array: a survey takes {MAX_ROUNDS} at most", rounds.len()),
-            "give a shorter course, or a larger --round-spacing",
-        )),
-        _ => Ok(input),
-    }
+    Ok(input)
 }
-
-/// Maximum number of rounds of an array: the time of a survey is proportional to it.
-const MAX_ROUNDS: usize = 200;
 
 /// Surveys until done or interrupted.
 fn find(args: &Args, input: &Input, scores: &PlanScores) -> Result<Survey, Failure> {
@@ -284,7 +269,7 @@ fn find(args: &Args, input: &Input, scores: &PlanScores) -> Result<Survey, Failu
         let _within = runtime.enter();
         Interrupts::listen()
     };
-    let bar = progress::spinner(&format!("survey of {}:", input.course.count()));
+    let bar = progress::spinner(&format!("survey of {}:", course::count(&input.course)));
     let observer = Observer { bar: bar.clone(), interrupts };
     let found =
         resume_survey(&input.world, input.course.input(), &args.options(), scores, &observer);
@@ -299,8 +284,9 @@ fn failure_from(error: &SurveyError) -> Failure {
         SurveyError::World(_) | SurveyError::Scene(_) | SurveyError::Option { .. } => {
             "check sensor and air of the logs, and the options"
         }
+        SurveyError::MixedCourse => "survey them separately",
+        SurveyError::TooManyRounds { .. } => "give a shorter course, or a larger --round-spacing",
         SurveyError::Group(error) => return Failure::input(error, error.help()),
-        SurveyError::FitOfArray => "leave out --fit",
         SurveyError::NotFittable { .. } => "poses, walls and posts are estimated in any case",
     };
     Failure::input(error, help)

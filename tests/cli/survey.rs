@@ -432,7 +432,7 @@ fn logs_that_do_not_belong_to_a_course_of_an_array_are_rejected() {
     };
     rejected(&[&ring, &sweep], &["scans of an array and of a ranger", "survey them separately"]);
     rejected(&[&sweep, &ring], &["scans of an array and of a ranger", "survey them separately"]);
-    rejected(&[&ring, "--fit", "threshold"], &["can't be fitted", "leave out --fit"]);
+    rejected(&[&ring, "--fit", "mounting"], &["can't be fitted", "it fits threshold"]);
     // Sixteen courses, one after the other.
     let text = fs::read_to_string(&ring).expect("a log");
     let many = path(folder.path(), "many.jsonl");

@@ -282,6 +282,15 @@ impl LineArrangement {
         }
     }
 
+    /// Turns all lines about the origin, then moves them.
+    pub(crate) fn move_by(&mut self, turned_rad: f64, by: DVec2) {
+        for (line, cuts) in self.lines.iter_mut().zip(&mut self.cuts) {
+            line.move_by(turned_rad, by);
+            let along_m = by.dot(line.along());
+            cuts.iter_mut().for_each(|cut| cut.along_m += along_m);
+        }
+    }
+
     /// Arrangement of moved lines with the same walls: ends at a crossing follow it, free ends keep
     /// their position.
     pub(crate) fn rebuilt(

@@ -23,16 +23,24 @@ pub enum SurveyError {
     #[error(transparent)]
     Group(#[from] GroupError),
     /// Group of numbers that a survey can't fit.
-    #[error("{} can't be fitted by a survey: {}", group.name(), names(fittable))]
+    #[error("{} can't be fitted by a survey of these readings: {}", group.name(), names(fittable))]
     NotFittable {
         /// Group that was requested.
         group: ParameterGroup,
         /// Groups that can be fitted.
         fittable: &'static [ParameterGroup],
     },
-    /// Group of numbers to fit for an array.
-    #[error("numbers of the ranger can't be fitted to rounds of an array")]
-    FitOfArray,
+    /// Scans of an array and of a ranger on a stepper together.
+    #[error("scans of an array and of a ranger on a stepper can't be surveyed together")]
+    MixedCourse,
+    /// More rounds of an array than a survey takes: its time is proportional to their number.
+    #[error("{rounds} rounds of the array: a survey takes {max} at most")]
+    TooManyRounds {
+        /// Rounds that were given.
+        rounds: usize,
+        /// Largest number of rounds.
+        max: usize,
+    },
     /// Invalid assumption.
     #[error("{name} is {value}: it must be {expected}")]
     Option {

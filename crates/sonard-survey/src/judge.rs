@@ -232,8 +232,9 @@ impl<'a> Judge<'a> {
         }
         self.are_headings_free.hash(&mut hasher);
         self.workspace.sensor.hash(&mut hasher);
-        // Without posts both are equal.
-        (self.workspace.single_contacts && !self.posts.is_empty()).hash(&mut hasher);
+        // Without posts and arrays both are equal.
+        let is_equal = self.posts.is_empty() && !self.workspace.is_array;
+        (self.workspace.is_simplified && !is_equal).hash(&mut hasher);
         hasher.finish()
     }
 
@@ -281,7 +282,7 @@ impl<'a> Judge<'a> {
         pose: &Pose,
     ) -> Option<f64> {
         let readings = &self.readings()[sweep];
-        let predicted = predict(simulator, readings, pose)?;
+        let predicted = self.predict(simulator, sweep, pose)?;
         let predicted = predicted.iter().map(outcome_of);
         Some(sweep_nats(readings, predicted, self.sigma_m, self.workspace.reach_m()))
     }
@@ -299,10 +300,33 @@ impl<'a> Judge<'a> {
     /// Predicted readings of all sweeps, and the simulator.
     pub(crate) fn predictions(&self, segments: &[Segment]) -> Option<(Simulator, Predictions)> {
         let simulator = self.simulator_of(segments)?;
-        let of_sweep = |(readings, pose)| predict(&simulator, readings, pose);
-        let all: Option<Predictions> =
-            self.readings().iter().zip(&self.poses).map(of_sweep).collect();
+        let of_sweep = |(sweep, pose)| self.predict(&simulator, sweep, pose);
+        let all: Option<Predictions> = self.poses.iter().enumerate().map(of_sweep).collect();
         all.map(|all| (simulator, all))
+    }
+
+    /// Predicted readings of a sweep from a pose; `None` if the scene has more paths than the model
+    /// follows.
+    fn predict(&self, simulator: &Simulator, sweep: usize, pose: &Pose) -> Option<Vec<Prediction>> {
+        let readings = &self.readings()[sweep];
+        let point = simulator.at(pose.position());
+        let of_beam = |beam: &Beam| {
+            let direction_rad = pose.direction_rad(beam.azimuth_deg);
+            if beam.face == DVec2::ZERO {
+                return point.ping(direction_rad).ok();
+            }
+            let face = pose.rotate_to_world(beam.face);
+            let prediction = match self.workspace.is_simplified {
+                true => point.ping_beside(direction_rad, face),
+                false => simulator.at(pose.position() + face).ping(direction_rad),
+            };
+            let mut prediction = prediction.ok()?;
+            if prediction.range_m.is_some_and(|range_m| range_m > readings.max_range_m) {
+                (prediction.status, prediction.range_m) = (PingStatus::NoEcho, None);
+            }
+            Some(prediction)
+        };
+        readings.beams.iter().map(of_beam).collect()
     }
 }
 
@@ -327,24 +351,6 @@ fn scene_of(template: &Scene, segments: &[Segment], posts: &[PostShape]) -> Scen
     };
     scene.cylinders = posts.iter().enumerate().map(post).collect();
     scene
-}
-
-fn predict(simulator: &Simulator, readings: &Readings, pose: &Pose) -> Option<Vec<Prediction>> {
-    let point = simulator.at(pose.position());
-    let beams = readings.beams.iter();
-    let of_beam = |beam: &Beam| {
-        let direction_rad = pose.direction_rad(beam.azimuth_deg);
-        if beam.face == DVec2::ZERO {
-            return point.ping(direction_rad).ok();
-        }
-        let face = pose.rotate_to_world(beam.face);
-        let mut prediction = point.ping_beside(direction_rad, face).ok()?;
-        if prediction.range_m.is_some_and(|range_m| range_m > readings.max_range_m) {
-            (prediction.status, prediction.range_m) = (PingStatus::NoEcho, None);
-        }
-        Some(prediction)
-    };
-    beams.map(of_beam).collect()
 }
 
 /// Mean of the directions in which an echo leaves and from which it returns: minus the derivative of

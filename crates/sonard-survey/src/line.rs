@@ -129,6 +129,15 @@ impl Line {
         line
     }
 
+    /// Turns the line about the origin, then moves it.
+    pub(crate) fn move_by(&mut self, turned_rad: f64, by: DVec2) {
+        self.normal_rad += turned_rad;
+        self.distance_m += by.dot(self.normal());
+        let along_m = by.dot(self.along());
+        self.feet.iter_mut().for_each(|foot| foot.along_m += along_m);
+        self.points.iter_mut().for_each(|point_m| *point_m += along_m);
+    }
+
     /// Recomputes the feet for changed poses.
     pub(crate) fn update_feet(&mut self, poses: &[Pose]) {
         let along = self.along();

@@ -1,6 +1,7 @@
 //! Normal equations of sparse robust least squares.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use sonard_inverse::LogLikelihood;
 use sonard_model::geometry::{Pose, wrap_180};
 
 /// Normal equations of residuals whose rows have few entries.
@@ -48,14 +49,19 @@ impl NormalEquations {
         self.information[(at, at)] += 1.0 / (sigma * sigma);
     }
 
-    /// Adds the derivative of a log-likelihood by a parameter.
-    pub(crate) fn add_gradient(&mut self, at: usize, by: f64) {
-        self.gradient[at] += by;
-    }
-
-    /// Adds an element of an information matrix.
-    pub(crate) fn add_information(&mut self, row: usize, column: usize, by: f64) {
-        self.information[(row, column)] += by;
+    /// Adds a log-likelihood whose parameters depend linearly on columns: for each parameter, the
+    /// columns with its derivatives by them.
+    pub(crate) fn add_likelihood(&mut self, map: &[Vec<(usize, f64)>], of: &LogLikelihood) {
+        for (at, columns) in map.iter().enumerate() {
+            for &(row, unit) in columns {
+                self.gradient[row] += unit * of.gradient[at];
+                for (other, by) in map.iter().enumerate() {
+                    for &(column, by) in by {
+                        self.information[(row, column)] += unit * by * of.information[(at, other)];
+                    }
+                }
+            }
+        }
     }
 
     /// Sum of the robust losses, nats.

@@ -80,6 +80,12 @@ impl Move {
         }
     }
 
+    /// Returns `true` if the direction of the move is known in the world instead of relative to the
+    /// robot.
+    pub(crate) const fn are_waypoints(&self) -> bool {
+        self.are_waypoints
+    }
+
     /// Negative log-density of a pair of poses relative to that of the likeliest pair, nats.
     pub(crate) fn loss(&self, from: &Pose, to: &Pose) -> f64 {
         let mut normal = NormalEquations::new(0);

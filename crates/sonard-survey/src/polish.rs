@@ -1,22 +1,29 @@
 //! Final estimate of poses and walls by the exact likelihood of all readings.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 use sonard_inverse::{ErrorModel, Hypotheses, LogLikelihood, Parameter, PostPart};
 
 use crate::{
     arc::{Arc, quantile},
     arrangement::Segment,
+    covariance::PlanCovariance,
     judge::Judge,
     normal::{NormalEquations, pose_column},
+    pose_climb::PoseClimb,
     posed::{LineColumns, PosedPlan},
     sensor_fit::FreeNumbers,
     trace::explain,
+    viewpoint::Viewpoint,
 };
 
-const MAX_STEPS: usize = 6;
+/// Factor of the standard deviations by the information matrix. It assumes a parabola, while arcs end
+/// and echoes vanish abruptly; in simulated rooms its 95 % intervals hold 82 to 94 % of the true
+/// poses, walls and corners, and 93 to 97 % with this factor.
+const WIDENED: f64 = 1.3;
+const MAX_STEPS: usize = 20;
 /// Gain below which no further step is made, nats.
-const MIN_GAIN: f64 = 0.05;
+const MIN_GAIN: f64 = 0.01;
 /// Scatter of the threshold from firing to firing before it is estimated, and choices, decibels.
 const SIGMA_DB: f64 = 1.0;
 const SPREADS_DB: [f64; 6] = [0.35, 0.5, 0.7, 1.0, 1.5, 2.5];
@@ -37,12 +44,13 @@ struct Linearized {
 }
 
 /// Improves poses, lines and posts by the likelihood of all readings: ranges, missing echoes and
-/// the ends of arcs. Directions are tied to a square axis if the survey assumes one. Returns `None` if the
-/// normal equations have no solution.
-pub(crate) fn polish(posed: &mut PosedPlan, judge: &Judge) -> Option<()> {
-    let (polished, _) = polish_with(posed, judge, FreeNumbers::none())?;
+/// the ends of arcs. Directions are tied to a square axis if the survey assumes one. Returns the
+/// covariance, or `None` if the normal equations have no solution.
+pub(crate) fn polish(posed: &mut PosedPlan, judge: &Judge) -> Option<PlanCovariance> {
+    let (polished, linear) = polish_with(posed, judge, FreeNumbers::none())?;
     *posed = polished.posed;
-    Some(())
+    let covariance = PlanCovariance::new(linear.normal.covariance()?, LineColumns::new(posed));
+    Some(covariance.scaled(WIDENED * WIDENED))
 }
 
 /// Improves poses, lines and posts as [`polish`], together with numbers of sensor and air; returns
@@ -85,14 +93,20 @@ fn climb(estimate: &mut Estimate, judge: &Judge, errors: &ErrorModel) -> Option<
     for _ in 0..MAX_STEPS {
         let step = best.normal.step(damping)?;
         let columns = LineColumns::new(&estimate.posed);
-        let tried = Estimate {
+        let stepped = Estimate {
             posed: estimate.posed.moved(&columns, &step, workspace.reach_m()),
             numbers: estimate.numbers.moved(&step.as_slice()[columns.count()..], &workspace.world),
         };
+        let in_plan = hypotheses(&stepped, judge, PoseClimb::PARAMETERS.to_vec())?;
+        let mut poses = stepped.posed.poses.clone();
+        PoseClimb::new(workspace, &in_plan, errors).improve(&mut poses);
+        let frame = stepped.posed.poses[0];
+        let posed = stepped.posed.with_poses(poses, workspace.reach_m()).in_frame(&frame);
+        let tried = Estimate { posed, ..stepped };
         let Some(at) = linearize(&tried, judge, errors) else { break };
         let gain = at.value - best.value;
         if gain <= 0.0 {
-            damping *= 30.0;
+            damping *= 10.0;
             continue;
         }
         (*estimate, best, damping) = (tried, at, 0.1 * damping);
@@ -140,33 +154,46 @@ fn absolute_errors_m(posed: &PosedPlan, judge: &Judge) -> Option<Vec<f64>> {
     Some(errors_m.map(f64::abs).collect())
 }
 
+/// Evaluator of the likelihood in the plan of an estimate.
+fn hypotheses(
+    Estimate { posed, numbers }: &Estimate,
+    judge: &Judge,
+    parameters: Vec<Parameter>,
+) -> Option<Hypotheses> {
+    let mut world = judge.workspace.world.clone();
+    world.sensor.mounting.left_m = judge.workspace.left_m;
+    let segments = posed.plan.segments(&posed.walls);
+    world.scene = std::sync::Arc::new(judge.with_posts(&posed.posts).scene_of(&segments));
+    Hypotheses::new(numbers.changed(&world)?, parameters).ok()
+}
+
 /// Predicts all sweeps with their derivatives.
 fn linearize(estimate: &Estimate, judge: &Judge, errors: &ErrorModel) -> Option<Linearized> {
     let Estimate { posed, numbers } = estimate;
     let workspace = judge.workspace;
     let segments = posed.plan.segments(&posed.walls);
-    let mut world = workspace.world.clone();
-    world.sensor.mounting.left_m = workspace.left_m;
-    world.scene = std::sync::Arc::new(judge.with_posts(&posed.posts).scene_of(&segments));
-    let mut parameters = vec![Parameter::X(0), Parameter::Y(0), Parameter::Heading(0)];
+    let mut parameters = PoseClimb::PARAMETERS.to_vec();
     parameters.extend((0..segments.len()).map(Parameter::Wall));
     parameters.extend((0..segments.len()).map(Parameter::WallTurn));
     let parts = [PostPart::X, PostPart::Y, PostPart::Radius];
     let of_post = |post: usize| parts.map(|part| Parameter::Post(post, part));
     parameters.extend((0..posed.posts.len()).flat_map(of_post));
     parameters.extend(numbers.parameters());
-    let hypotheses = Hypotheses::new(numbers.changed(&world)?, parameters).ok()?;
-    let of_sweep = |(sweep, pose)| hypotheses.log_likelihood(sweep, pose, errors).ok();
-    let pairs = workspace.sweeps.par_iter().zip(&posed.poses);
-    let all: Option<Vec<LogLikelihood>> = pairs.map(of_sweep).collect();
+    let hypotheses = hypotheses(estimate, judge, parameters)?;
+    let of_viewpoint = |viewpoint: &Viewpoint| {
+        let pose = viewpoint.pose(&posed.poses[viewpoint.sweep]);
+        hypotheses.log_likelihood(&viewpoint.beams, &pose, errors).ok()
+    };
+    let viewpoints = workspace.viewpoints.par_iter();
+    let all: Option<Vec<LogLikelihood>> = viewpoints.map(of_viewpoint).collect();
     let columns = LineColumns::new(posed);
     let mut normal = NormalEquations::new(columns.count() + numbers.count());
     let mut value = 0.0;
-    for (sweep, likelihood) in all?.iter().enumerate() {
+    for (viewpoint, likelihood) in workspace.viewpoints.iter().zip(&all?) {
         value += likelihood.value;
-        let mut map = parameter_columns(posed, &segments, &columns, sweep);
+        let mut map = parameter_columns(posed, &segments, &columns, viewpoint);
         map.extend((0..numbers.count()).map(|at| vec![(columns.count() + at, 1.0)]));
-        add_mapped(&mut normal, &map, &likelihood.gradient, &likelihood.information);
+        normal.add_likelihood(&map, likelihood);
     }
     for (at, step) in workspace.moves.iter().enumerate() {
         if let [from, to, ..] = &posed.poses[at..] {
@@ -183,7 +210,7 @@ fn linearize(estimate: &Estimate, judge: &Judge, errors: &ErrorModel) -> Option<
     Some(Linearized { value, normal })
 }
 
-/// Derivatives of the parameters of a sweep (its pose, the offsets of all walls, their turns, the
+/// Derivatives of the parameters of a viewpoint (its pose, the offsets of all walls, their turns, the
 /// posts) by columns of the normal equations.
 ///
 /// Headings and turns are in degrees there and in radians here. The normal of a wall points to its
@@ -193,37 +220,17 @@ fn parameter_columns(
     posed: &PosedPlan,
     segments: &[Segment],
     columns: &LineColumns,
-    sweep: usize,
+    viewpoint: &Viewpoint,
 ) -> Vec<Vec<(usize, f64)>> {
     let to_deg = 1f64.to_degrees();
-    let of_pose = [(0, 1.0), (1, 1.0), (2, to_deg)]
-        .map(|(offset, unit)| pose_column(sweep).map(|at| (at + offset, unit)));
+    let of_pose =
+        viewpoint.pose_columns(&posed.poses[viewpoint.sweep], pose_column(viewpoint.sweep));
     let offset = |wall: &Segment| {
         let middle_m = posed.plan.lines[wall.line].along_m(wall.a.midpoint(wall.b));
         columns.of(wall.line).map_or_else(Vec::new, |at| vec![(at, middle_m), (at + 1, -1.0)])
     };
     let turn = |wall: &Segment| columns.of(wall.line).map(|at| (at, to_deg));
-    let of_pose = of_pose.into_iter().map(|of| of.into_iter().collect());
     let turns = segments.iter().map(|wall| turn(wall).into_iter().collect());
     let of_posts = (columns.of_post(0)..columns.count()).map(|at| vec![(at, 1.0)]);
-    of_pose.chain(segments.iter().map(offset)).chain(turns).chain(of_posts).collect()
-}
-
-/// Adds a gradient and an information matrix whose parameters depend linearly on columns.
-fn add_mapped(
-    normal: &mut NormalEquations,
-    map: &[Vec<(usize, f64)>],
-    gradient: &DVector<f64>,
-    information: &DMatrix<f64>,
-) {
-    for (at, of) in map.iter().enumerate() {
-        for &(row, unit) in of {
-            normal.add_gradient(row, unit * gradient[at]);
-            for (other, by) in map.iter().enumerate() {
-                for &(column, by) in by {
-                    normal.add_information(row, column, unit * by * information[(at, other)]);
-                }
-            }
-        }
-    }
+    of_pose.into_iter().chain(segments.iter().map(offset)).chain(turns).chain(of_posts).collect()
 }

@@ -1,7 +1,7 @@
 //! Plan with its poses, and the columns of both in normal equations.
 
 use nalgebra::DVector;
-use sonard_model::geometry::Pose;
+use sonard_model::geometry::{DVec2, Pose, wrap_180};
 
 use crate::{
     arrangement::{LineArrangement, PieceSet, Run},
@@ -48,6 +48,33 @@ impl PosedPlan {
         let posts = self.posts.iter().enumerate();
         let posts = posts.map(|(at, post)| post.moved(three(columns.of_post(at)))).collect();
         Self { plan, walls, posts, poses }
+    }
+
+    /// Plan with other poses, with lines as long as the range `reach_m`.
+    pub(crate) fn with_poses(self, poses: Vec<Pose>, reach_m: f64) -> Self {
+        let mut lines = self.plan.lines.clone();
+        lines.iter_mut().for_each(|line| line.update_feet(&poses));
+        let (plan, walls) = self.plan.rebuilt(&self.walls, lines, &poses, reach_m);
+        Self { plan, walls, poses, ..self }
+    }
+
+    /// Plan and poses moved together so that the first pose is `frame`.
+    pub(crate) fn in_frame(mut self, frame: &Pose) -> Self {
+        let Some(&first) = self.poses.first() else { return self };
+        let turned_deg = frame.heading_deg - first.heading_deg;
+        let turn = DVec2::from_angle(turned_deg.to_radians());
+        let by = frame.position() - turn.rotate(first.position());
+        for pose in &mut self.poses {
+            let place = turn.rotate(pose.position()) + by;
+            (pose.x_m, pose.y_m) = (place.x, place.y);
+            pose.heading_deg = wrap_180(pose.heading_deg + turned_deg);
+        }
+        self.poses[0] = *frame;
+        for post in &mut self.posts {
+            post.center = turn.rotate(post.center) + by;
+        }
+        self.plan.move_by(turned_deg.to_radians(), by);
+        self
     }
 
     /// Plan without walls shorter than `max_m` metres.

@@ -21,15 +21,18 @@ use crate::{
 static GROUPS: [ParameterGroup; 10] = [
     ParameterGroup::Threshold,
     ParameterGroup::Rise,
-    ParameterGroup::Mounting,
     ParameterGroup::Materials,
     ParameterGroup::Air,
     ParameterGroup::Delay,
-    ParameterGroup::Gear,
     ParameterGroup::Beam,
     ParameterGroup::Skirts,
     ParameterGroup::Pulse,
+    ParameterGroup::Mounting,
+    ParameterGroup::Gear,
 ];
+/// Number of the last groups that describe a stepper; positions and directions of an array's
+/// transducers are given.
+const OF_STEPPER: usize = 2;
 /// Change, as a share of the prior standard deviation, up to which the plan is not searched again.
 const SETTLED_SHARE: f64 = 0.02;
 
@@ -76,14 +79,14 @@ impl FreeNumbers {
 
     /// Adds the priors to normal equations from a column on; returns the loss, nats.
     pub(crate) fn add_priors(&self, normal: &mut NormalEquations, first: usize) -> f64 {
-        let mut loss = 0.0;
+        /// Priors are not robust.
+        const NORMAL: f64 = 1e3;
+        let before = normal.loss();
         for (at, prior) in self.priors.iter().enumerate() {
-            let off = (self.base[at] + self.values[at]) / prior.sigma;
-            loss += 0.5 * off * off;
-            normal.add_gradient(first + at, -off / prior.sigma);
-            normal.hold(first + at, prior.sigma);
+            let off = self.base[at] + self.values[at];
+            normal.add(&[(first + at, 1.0)], -off, prior.sigma, NORMAL);
         }
-        loss
+        normal.loss() - before
     }
 }
 
@@ -102,13 +105,19 @@ pub(crate) struct SensorFitter {
 }
 
 impl SensorFitter {
-    /// Fit of the groups of the options, at the values of a world.
+    /// Fit of the groups of the options, at the values of a world, to sweeps of a stepper or rounds
+    /// of an array.
     ///
     /// # Errors
     /// A group that a survey can't fit, or that does not apply to the sensor.
-    pub(crate) fn new(world: &World, options: &SurveyOptions) -> Result<Self, SurveyError> {
-        if let Some(group) = options.fit.iter().find(|group| !GROUPS.contains(group)) {
-            return Err(SurveyError::NotFittable { group: *group, fittable: &GROUPS });
+    pub(crate) fn new(
+        world: &World,
+        options: &SurveyOptions,
+        is_array: bool,
+    ) -> Result<Self, SurveyError> {
+        let fittable = if is_array { &GROUPS[..GROUPS.len() - OF_STEPPER] } else { &GROUPS[..] };
+        if let Some(group) = options.fit.iter().find(|group| !fittable.contains(group)) {
+            return Err(SurveyError::NotFittable { group: *group, fittable });
         }
         let initial = empty_scene_of(world, options.reflectance);
         let priors = priors(&options.fit, &[], &initial, 0)?;

@@ -13,7 +13,7 @@ use sonard_model::{
 use crate::{
     arrangement::{LineArrangement, Segment},
     error::SurveyError,
-    input::SurveyInput,
+    input::{MAX_ARRAY_ROUNDS, SurveyInput},
     judge::Judge,
     odometry::Move,
     options::SurveyOptions,
@@ -42,12 +42,13 @@ const SEARCH_SHARE: f64 = 0.7;
 /// and the face of the sensor is assumed on the axis of the stepper or ahead of it. The result is
 /// independent of the number of threads.
 ///
-/// Rounds of an array are predicted from the pose of the robot, to the first order of the offsets of
-/// the transducers ([`ping_beside`](sonard_model::model::ObservationPoint::ping_beside)). No numbers
-/// are fitted to them, and the result has no next view.
+/// The search predicts rounds of an array from the pose of the robot, to the first order of the
+/// offsets of the transducers ([`ping_beside`](sonard_model::model::ObservationPoint::ping_beside));
+/// the final estimate and the alternatives are by exact predictions from each transducer. The result
+/// has no next view.
 ///
 /// # Errors
-/// Fewer than two sweeps or rounds, a sweep without arcs, numbers to fit for an array, or an invalid
+/// Fewer than two sweeps or rounds, more than 200 rounds, a sweep without arcs, numbers that can't be fitted, or an invalid
 /// sensor or option.
 pub fn survey<'a>(
     world: &World,
@@ -72,17 +73,18 @@ pub fn resume_survey<'a>(
 ) -> Result<Survey, SurveyError> {
     let input = input.into();
     let sweeps = &input.sweeps();
-    let mut fitter = SensorFitter::new(world, options)?;
+    let mut fitter = SensorFitter::new(world, options, input.is_array())?;
     let mut scored = HashSet::new();
     let mut last: Option<PosedPlan> = None;
     for round in 1.. {
         let (world, reflectance) = fitter.world()?;
         let options = &SurveyOptions { reflectance, ..options.clone() };
-        // Repeated contacts with posts take most of the time near them, and change few readings: the
-        // final estimate and the alternatives include them.
+        // Repeated contacts with posts take most of the time near them, and change few readings, as
+        // do exact predictions from each transducer of an array: the final estimate and the
+        // alternatives include them.
         let workspace = workspace(&world, (input, sweeps), options, (observer, scores))?
             .following(scored, fitter.digest())
-            .with_single_contacts()?;
+            .simplified()?;
         workspace.limit_scenes((SEARCH_SHARE * options.max_scenes as f64) as usize);
         let mut search = SurveySearch::new(&workspace, options);
         match last.take() {
@@ -97,7 +99,7 @@ pub fn resume_survey<'a>(
             scored = workspace.into_scored();
             continue;
         }
-        let workspace = workspace.with_all_contacts()?;
+        let workspace = workspace.complete()?;
         workspace.limit_scenes(options.max_scenes);
         let mut search = SurveySearch::with_plan(&workspace, options, posed);
         search.report_progress(SurveyStage::Alternatives);
@@ -160,10 +162,10 @@ pub(crate) fn workspace<'a>(
     if sweeps.len() < 2 {
         return Err(SurveyError::TooFewSweeps(sweeps.len()));
     }
-    options.check()?;
-    if input.is_array() && !options.fit.is_empty() {
-        return Err(SurveyError::FitOfArray);
+    if input.is_array() && sweeps.len() > MAX_ARRAY_ROUNDS {
+        return Err(SurveyError::TooManyRounds { rounds: sweeps.len(), max: MAX_ARRAY_ROUNDS });
     }
+    options.check()?;
     let errors = RangeErrors::new(&world.sensor, options);
     let mut world = world.clone();
     if input.is_array() {
@@ -183,8 +185,8 @@ pub(crate) fn workspace<'a>(
     let moves = options.odometry.map_or_else(Vec::new, between);
     let square_rad = options.square_deg.map(f64::to_radians);
     let model = (world.clone(), simulator);
-    let workspace = Workspace::new(model, sweeps, (readings, errors), square_rad, moves, watched)
-        .with_array(input.is_array())
+    let read = (readings, errors);
+    let workspace = Workspace::new(model, (input, sweeps), read, square_rad, moves, watched)
         .with_left_m(left_m);
     if input.is_array() {
         // A round far from all walls has no echo; odometry connects those beside it.

@@ -14,11 +14,13 @@ use sonard_model::model::Simulator;
 use crate::{
     arc::{Arc, find_arcs},
     error::SurveyError,
+    input::SurveyInput,
     odometry::Move,
     progress::SurveyObserver,
     range_errors::RangeErrors,
     readings::Readings,
     scores::PlanScores,
+    viewpoint::Viewpoint,
 };
 
 /// Inputs of a survey with its budget.
@@ -30,8 +32,11 @@ pub(crate) struct Workspace<'a> {
     pub(crate) is_array: bool,
     /// Simulator of that world, whose scene gives material and options, without walls.
     pub(crate) simulator: Simulator,
-    /// Scores are without echoes that touch posts more than once, or a post and an edge.
-    pub(crate) single_contacts: bool,
+    /// Beams by the position that they are fired from.
+    pub(crate) viewpoints: Vec<Viewpoint<'a>>,
+    /// Predictions are those of the search: without echoes that touch posts more than once, or a post
+    /// and an edge, and to the first order of the positions of an array's transducers.
+    pub(crate) is_simplified: bool,
     pub(crate) readings: Vec<Readings>,
     pub(crate) errors: RangeErrors,
     /// Standard deviation of directions of walls from a square axis, radians.
@@ -53,7 +58,7 @@ pub(crate) struct Workspace<'a> {
 impl<'a> Workspace<'a> {
     pub(crate) fn new(
         (world, simulator): (World, Simulator),
-        sweeps: &'a [FitSweep],
+        (input, sweeps): (SurveyInput<'a>, &'a [FitSweep]),
         (readings, errors): (Vec<Readings>, RangeErrors),
         square_rad: Option<f64>,
         moves: Vec<Move>,
@@ -65,9 +70,10 @@ impl<'a> Workspace<'a> {
         Self {
             world,
             sweeps,
-            is_array: false,
+            is_array: input.is_array(),
+            viewpoints: input.viewpoints(sweeps),
             simulator,
-            single_contacts: false,
+            is_simplified: false,
             readings,
             errors,
             square_rad,
@@ -88,21 +94,16 @@ impl<'a> Workspace<'a> {
         Self { scored: Mutex::new(scored), sensor, ..self }
     }
 
-    /// Workspace whose scores leave out echoes that touch posts more than once, or a post and an edge.
-    pub(crate) fn with_single_contacts(self) -> Result<Self, SurveyError> {
+    /// Workspace with the simplified predictions of the search.
+    pub(crate) fn simplified(self) -> Result<Self, SurveyError> {
         let simulator = self.simulator.with_single_contacts().map_err(WorldError::from)?;
-        Ok(Self { simulator, single_contacts: true, ..self })
+        Ok(Self { simulator, is_simplified: true, ..self })
     }
 
-    /// Workspace that scores all echoes.
-    pub(crate) fn with_all_contacts(self) -> Result<Self, SurveyError> {
+    /// Workspace with complete predictions.
+    pub(crate) fn complete(self) -> Result<Self, SurveyError> {
         let simulator = self.world.simulator(&self.sweeps[0].pose)?;
-        Ok(Self { simulator, single_contacts: false, ..self })
-    }
-
-    /// Workspace whose sweeps are rounds of an array, or not.
-    pub(crate) fn with_array(self, is_array: bool) -> Self {
-        Self { is_array, ..self }
+        Ok(Self { simulator, is_simplified: false, ..self })
     }
 
     /// Workspace with the face left of the axis, metres.
@@ -134,11 +135,10 @@ impl<'a> Workspace<'a> {
 
     /// Factor of the standard deviations of estimates. Nearer echoes cut most arcs of a coarse
     /// ranger; the biases of their middles are common to many beams, and in a measured arena turn
-    /// walls and headings by up to five times what the normal equations give. Poses of an array are
-    /// also moved by the likelihood, on a grid and to the first order of the positions of rangers.
+    /// walls and headings by up to five times what the normal equations give.
     pub(crate) fn bias_factor(&self) -> f64 {
         const OF_COARSE: f64 = 3.0;
-        if self.errors.is_coarse() || self.is_array { OF_COARSE } else { 1.0 }
+        if self.errors.is_coarse() { OF_COARSE } else { 1.0 }
     }
 
     /// Share of its arcs unexplained beyond which the pose of a sweep may be wrong; less without

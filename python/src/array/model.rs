@@ -310,7 +310,7 @@ fn build_model(
 
 /// Returns the sensor that an array names: a file, or a preset. An existing file takes precedence,
 /// as for the command.
-fn own_sensor(py: Python<'_>, name: &str) -> PyResult<Sensor> {
+pub(crate) fn own_sensor(py: Python<'_>, name: &str) -> PyResult<Sensor> {
     match Path::new(name).is_file() {
         true => Sensor::load(py, name.into()),
         false => Sensor::preset(py, name),

@@ -1,12 +1,11 @@
 //! Next view of a survey as text.
 
-use super::course::Course;
-use crate::survey::{NextView, OpenPart, ResolvedPart, Survey};
+use crate::survey::{NextView, OpenPart, ResolvedPart, Survey, SurveyCourse};
 
 /// Place and expected gain of the next view in a sentence, and one for each part that it resolves.
-pub(super) fn sentences(course: &Course, found: &Survey) -> (String, Vec<String>) {
+pub(super) fn sentences(course: &SurveyCourse, found: &Survey) -> (String, Vec<String>) {
     let open = format!("{:.2} nats", found.open_nats);
-    if let Course::Rounds(_) = course {
+    if let SurveyCourse::Rounds(_) = course {
         return ("none: it is computed for a ranger on a stepper only".to_owned(), Vec::new());
     }
     match &found.next_view {

@@ -1,6 +1,9 @@
 //! Picture of a survey.
 
-use super::{Args, Input};
+use super::{
+    Args, Input,
+    course::{self, BeamEcho},
+};
 use crate::{
     cli::{
         Failure, Outcome,
@@ -81,10 +84,10 @@ fn corner(end: &SurveyedEnd) -> Option<(DVec2, f64)> {
 
 /// Echoes at the poses found.
 fn echoes(input: &Input, found: &Survey) -> Vec<(DVec2, EchoCause)> {
-    let beams = input.course.beams(input.world.air.sound_speed_m_s());
+    let all = course::echoes(&input.course, input.world.air.sound_speed_m_s());
     let mut echoes = Vec::new();
-    for ((beams, of), causes) in beams.into_iter().zip(&found.poses).zip(&found.causes) {
-        for ((position, azimuth_deg, range_m), cause) in beams.into_iter().zip(causes) {
+    for ((beams, of), causes) in all.into_iter().zip(&found.poses).zip(&found.causes) {
+        for (BeamEcho { position, azimuth_deg, range_m }, cause) in beams.into_iter().zip(causes) {
             let cause = match cause {
                 ReadingCause::First => EchoCause::First,
                 ReadingCause::Multiple => EchoCause::Multiple,

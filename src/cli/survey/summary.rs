@@ -5,7 +5,7 @@ use std::{
     io::{self, Write},
 };
 
-use super::{Input, next_view};
+use super::{Input, course, next_view};
 use crate::{
     cli::table::{align_right, fit, ruled},
     scan::text::format_count,
@@ -22,7 +22,7 @@ pub(super) fn in_short(input: &Input, found: &Survey) -> String {
     };
     format!(
         "{walls}{posts} from {}; {explained} of {} explained",
-        input.course.count(),
+        course::count(&input.course),
         format_count(found.arcs, "arc"),
     )
 }

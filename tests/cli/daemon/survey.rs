@@ -113,7 +113,14 @@ fn rejected_surveys() {
     };
     for (request, status, words, field) in [
         (json!({}), 422, "0 scans", Some("scans")),
-        (json!({"scans": scans[..1]}), 422, "1 scans", Some("scans")),
+        (json!({"scans": scans[..1]}), 422, "too few sweeps (1)", None),
+        (json!({"sweeps": [sweep(9, 1.0)]}), 422, "1 sweeps", Some("sweeps")),
+        (
+            json!({"scans": scans, "round_spacing_m": -1}),
+            422,
+            "round_spacing_m is -1",
+            Some("round_spacing_m"),
+        ),
         (json!({"scans": vec![scans[0].clone(); 41]}), 422, "41 scans", Some("scans")),
         (json!({"scans": scans, "sweeps": [sweep(9, 1.0)]}), 422, "both given", Some("sweeps")),
         (json!({"scans": [scans[0], absent]}), 404, "unknown scan", None),
@@ -150,6 +157,37 @@ fn rejected_surveys() {
     let idle = daemon.send("DELETE", "/v1/survey", "");
     assert_eq!(idle.status, 409, "{}", idle.json());
     assert_eq!(idle.json()["error"], "no survey is running");
+}
+
+#[test]
+fn array_is_surveyed_as_by_the_command() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let along = (0..7).map(|at| format!("{},0.7,0\n", 0.6 + 0.2 * f64::from(at)));
+    let up = (0..6).map(|at| format!("1.9,{},90\n", 0.7 + 0.15 * f64::from(at)));
+    let way: String = along.chain(up).collect();
+    let ring = ["--array", "ring-12", "--max-range", "4"];
+    let log = simulated(folder.path(), 1, ROOM, &way, &ring);
+    let daemon = InProcess::start_mock(folder.path(), &["--set", "scanning.mode=on-request"]);
+    let scans = scans(&daemon.get("/v1/scans?limit=500"));
+    let request = json!({"scans": scans, "max_range_m": 4, "round_spacing_m": 0.3}).to_string();
+    let found = result(&daemon.send("POST", "/v1/survey", &request)).survey;
+    assert_eq!((found.walls.len(), found.poses.len()), (4, 7));
+
+    let out = folder.path().join("out");
+    let [log, out] = [&log, &out].map(|path| path.to_str().expect("a plain path"));
+    let arguments = ["survey", log, "--max-range", "4", "--round-spacing", "0.3", "--out", out];
+    let survey = run(&[&arguments[..], &["--json"]].concat());
+    assert_eq!(survey.status.code(), Some(0), "{}", stderr(&survey));
+    let listed: Value = serde_json::from_slice(&survey.stdout).expect("JSON");
+    assert_eq!(serde_json::to_value(&found).expect("JSON"), listed);
+
+    // A stepper's scan among them is rejected.
+    simulated(folder.path(), 2, ROOM, STOPS, &["--max-range", "4", "--step-deg", "3.6"]);
+    let all = self::scans(&daemon.get("/v1/scans?limit=500"));
+    let reply = daemon.send("POST", "/v1/survey", &json!({"scans": all}).to_string());
+    assert_eq!(reply.status, 409);
+    let error = reply.json()["error"].to_string();
+    assert!(error.contains("scans of an array and of a ranger on a stepper"), "{error}");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use serde_json::Value;
 use sonard_inverse::ParameterGroup;
 use sonard_model::geometry::Pose;
 use sonard_records::FloorPlan;
-use sonard_survey::{OdometrySigma, Survey, SurveyOptions, SurveyProgress};
+use sonard_survey::{OdometrySigma, Survey, SurveyCourse, SurveyOptions, SurveyProgress};
 use uuid::Uuid;
 
 /// Maximum number of sweeps of a survey.
@@ -22,8 +22,8 @@ pub const MAX_SURVEY_SCENES: usize = 100_000;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SurveyRequest {
-    /// Scans of one sensor in the order of the course, from `GET /v1/scans`; their poses are
-    /// odometry.
+    /// Scans of one sensor in the order of the course, from `GET /v1/scans`, of a ranger on a stepper
+    /// or of an array on a moving robot; their poses are odometry.
     #[serde(default)]
     #[schemars(length(max = MAX_SURVEYED_SWEEPS))]
     pub scans: Vec<Uuid>,
@@ -57,6 +57,11 @@ pub struct SurveyRequest {
     #[serde(default)]
     #[schemars(length(max = MAX_FITTED_GROUPS))]
     pub fit: Vec<ParameterGroup>,
+    /// Minimum distance between rounds of an array that are used, metres, unless the robot turns by 5
+    /// degrees.
+    #[serde(default = "default_round_spacing_m")]
+    #[schemars(range(min = 0, max = 5))]
+    pub round_spacing_m: f64,
     /// Maximum distance of the next view from a stop, metres.
     #[serde(default = "default_view_reach_m")]
     #[schemars(range(min = 0, max = 20))]
@@ -108,6 +113,10 @@ const fn default_max_range_m() -> f64 {
 
 fn default_reflectance() -> f64 {
     SurveyOptions::default().reflectance
+}
+
+const fn default_round_spacing_m() -> f64 {
+    SurveyCourse::ROUND_SPACING_M
 }
 
 fn default_view_reach_m() -> f64 {

@@ -471,16 +471,13 @@ impl<'a> SurveySearch<'a> {
     /// With a coarse ranger an estimate that scores lower is dropped: where arcs end depends on a
     /// sensitivity that is not known well, and its few wide beams let that move the poses.
     fn polish(&mut self, judge: &Judge) {
-        if self.workspace.is_array {
-            return;
-        }
         let is_coarse = self.errors().is_coarse();
         let before = is_coarse.then(|| (self.posed.clone(), self.score_now(judge.sigma_m)));
-        polish(&mut self.posed, judge);
-        if let Some((posed, score)) = before
-            && self.score_now(judge.sigma_m) < score
-        {
-            self.posed = posed;
+        let covariance = polish(&mut self.posed, judge);
+        match before {
+            Some((posed, score)) if self.score_now(judge.sigma_m) < score => self.posed = posed,
+            Some(_) => (),
+            None => self.covariance = covariance.or_else(|| self.covariance.take()),
         }
     }
 

@@ -135,5 +135,8 @@ fn groups_that_cannot_be_fitted_are_rejected() {
     let error = with(ParameterGroup::Walls);
     assert!(matches!(error, SurveyError::NotFittable { group: ParameterGroup::Walls, .. }));
     let text = error.to_string();
-    assert!(text.starts_with("walls can't be fitted by a survey: it fits threshold,"), "{text}");
+    assert!(
+        text.starts_with("walls can't be fitted by a survey of these readings: it fits threshold,"),
+        "{text}"
+    );
 }

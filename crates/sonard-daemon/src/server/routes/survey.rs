@@ -13,7 +13,8 @@ use sonard_api::{
 use sonard_inverse::{FiringOutcome, FitSweep, SweepFiring, World};
 use sonard_log::ScanSpan;
 use sonard_survey::{
-    Survey, SurveyError, SurveyObserver, SurveyOptions, SurveyProgress, survey, unknown_room,
+    Survey, SurveyCourse, SurveyError, SurveyObserver, SurveyOptions, SurveyProgress, survey,
+    unknown_room,
 };
 use tokio::sync::oneshot;
 use uuid::Uuid;
@@ -73,11 +74,12 @@ async fn start(
     }
     let permit = acquire_permit(&api).await?;
     let is_uploaded = passages.is_empty();
-    let (world, sweeps) = match is_uploaded {
+    let (world, course) = match is_uploaded {
         true => uploaded(&api, &request)?,
         false => {
-            let max_range_m = request.max_range_m;
-            let reading = tokio::task::spawn_blocking(move || logged(&passages, max_range_m));
+            let (max_range_m, spacing_m) = (request.max_range_m, request.round_spacing_m);
+            let reading =
+                tokio::task::spawn_blocking(move || logged(&passages, max_range_m, spacing_m));
             reading.await.map_err(|error| internal_error(&error))??
         }
     };
@@ -89,7 +91,7 @@ async fn start(
     let response = stream_results("application/x-ndjson", permit, move |results| {
         let began = Mutex::new(Some(began));
         let observer = Observer { results, is_cancelled, began: &began };
-        match survey(&world, &sweeps, &options, &observer) {
+        match survey(&world, &course, &options, &observer) {
             Ok(found) => {
                 let _ =
                     results.send(&SurveyEvent::Result(Box::new(report(found, is_closed))), "\n");
@@ -116,16 +118,22 @@ async fn cancel(State(api): State<Api>) -> Result<Json<Accepted>, ApiError> {
 }
 
 fn check_size(request: &SurveyRequest) -> Result<(), ApiError> {
-    let SurveyRequest { scans, sweeps, max_scenes, .. } = request;
+    let SurveyRequest { scans, sweeps, max_scenes, round_spacing_m, .. } = request;
     if !scans.is_empty() && !sweeps.is_empty() {
         let help = "send scans of the logs or uploaded sweeps, not both";
         return Err(invalid("scans and sweeps are both given", help, "sweeps".into()));
     }
     let count = scans.len().max(sweeps.len());
-    if !(2..=MAX_SURVEYED_SWEEPS).contains(&count) {
+    // A scan of an array has many rounds.
+    let min = if scans.is_empty() { 2 } else { 1 };
+    if !(min..=MAX_SURVEYED_SWEEPS).contains(&count) {
         let help = format!("a survey takes 2 to {MAX_SURVEYED_SWEEPS}, from different places");
         let field = if sweeps.is_empty() { "scans" } else { "sweeps" };
         return Err(invalid(&format!("{count} {field}"), &help, field.into()));
+    }
+    if !(0.0..=5.0).contains(round_spacing_m) {
+        let error = format!("round_spacing_m is {round_spacing_m}");
+        return Err(invalid(&error, "from 0 to 5", "round_spacing_m".into()));
     }
     if !(1..=MAX_SURVEY_SCENES).contains(max_scenes) {
         let help = format!("from 1 to {MAX_SURVEY_SCENES}");
@@ -146,14 +154,23 @@ fn options(request: &SurveyRequest) -> SurveyOptions {
     }
 }
 
-/// Reads the scans and the conditions that they share. Reads the disk.
-fn logged(passages: &[ScanSpan], max_range_m: f64) -> Result<(World, Vec<FitSweep>), ApiError> {
+/// Reads the scans, with rounds of an array at a minimum distance in metres, and the conditions that
+/// they share. Reads the disk.
+fn logged(
+    passages: &[ScanSpan],
+    max_range_m: f64,
+    spacing_m: f64,
+) -> Result<(World, SurveyCourse), ApiError> {
     let unusable = |why: String| ApiError::new(StatusCode::CONFLICT, why, "leave this scan out");
-    let mut sweeps = Vec::with_capacity(passages.len());
+    let mut course: Option<SurveyCourse> = None;
     let mut first = None;
     for passage in passages {
         let view = read(passage)?;
-        sweeps.push(FitSweep::from_scan(&view).map_err(|error| unusable(error.to_string()))?);
+        let found = SurveyCourse::from_scan(&view).map_err(|error| unusable(error.to_string()))?;
+        match &mut course {
+            None => course = Some(found),
+            Some(course) => course.extend(found).map_err(|error| survey_error(&error))?,
+        }
         // Every sweep has a session.
         let Some(session) = view.session else { continue };
         if first.get_or_insert_with(|| Arc::clone(&session)).sensor != session.sensor {
@@ -162,15 +179,17 @@ fn logged(passages: &[ScanSpan], max_range_m: f64) -> Result<(World, Vec<FitSwee
             return Err(ApiError::new(StatusCode::CONFLICT, error, help));
         }
     }
-    let session = first.ok_or_else(|| unusable("the scans have no session".into()))?;
+    let (session, mut course) =
+        first.zip(course).ok_or_else(|| unusable("the scans have no session".into()))?;
+    course.thin(spacing_m);
     let (air, options) = session.model_conditions().map_err(|error| unusable(error.to_string()))?;
     let options = options.unwrap_or_default();
     let world = unknown_room(session.sensor.clone(), air, options, max_range_m);
-    Ok((world.map_err(|error| survey_error(&error))?, sweeps))
+    Ok((world.map_err(|error| survey_error(&error))?, course))
 }
 
 /// Checks uploaded sweeps, which are of the current sensor.
-fn uploaded(api: &Api, request: &SurveyRequest) -> Result<(World, Vec<FitSweep>), ApiError> {
+fn uploaded(api: &Api, request: &SurveyRequest) -> Result<(World, SurveyCourse), ApiError> {
     let next = api.daemon.next_scan();
     let order = AirOrder {
         temperature_c: next.air.temperature_c,
@@ -183,7 +202,8 @@ fn uploaded(api: &Api, request: &SurveyRequest) -> Result<(World, Vec<FitSweep>)
     let us_per_m = 2e6 / air.sound_speed_m_s();
     let sweeps = request.sweeps.iter().enumerate();
     let sweeps = sweeps.map(|(at, sweep)| uploaded_sweep(at, sweep, us_per_m));
-    Ok((world.map_err(|error| survey_error(&error))?, sweeps.collect::<Result<_, _>>()?))
+    let sweeps = SurveyCourse::Sweeps(sweeps.collect::<Result<_, _>>()?);
+    Ok((world.map_err(|error| survey_error(&error))?, sweeps))
 }
 
 fn uploaded_sweep(at: usize, given: &UploadedSweep, us_per_m: f64) -> Result<FitSweep, ApiError> {
@@ -228,13 +248,14 @@ fn invalid(error: &str, help: &str, field: String) -> ApiError {
 
 fn survey_error(error: &SurveyError) -> ApiError {
     let (status, help) = match error {
-        SurveyError::Option { .. }
-        | SurveyError::Group(_)
-        | SurveyError::NotFittable { .. }
-        | SurveyError::FitOfArray => {
+        SurveyError::Option { .. } | SurveyError::Group(_) | SurveyError::NotFittable { .. } => {
             (StatusCode::UNPROCESSABLE_ENTITY, "see `sonard survey --help`")
         }
         SurveyError::TooFewSweeps(_) => (StatusCode::UNPROCESSABLE_ENTITY, "send further sweeps"),
+        SurveyError::TooManyRounds { .. } => {
+            (StatusCode::UNPROCESSABLE_ENTITY, "send fewer scans, or raise round_spacing_m")
+        }
+        SurveyError::MixedCourse => (StatusCode::CONFLICT, "survey them separately"),
         SurveyError::NoArcs(_) => {
             (StatusCode::CONFLICT, "leave this scan out, or raise max_range_m")
         }
