@@ -5,6 +5,8 @@
 //! cargo run --release -p sonard-survey --example evaluate -- --next-view --kinds l --stops 8
 //! ```
 
+mod baselines;
+mod course;
 mod explore;
 mod intervals;
 mod measure;
@@ -19,14 +21,16 @@ use sonard_model::{
     scene::Scene,
 };
 use sonard_survey::{
-    NoObserver, OdometrySigma, PieceStatus, PostShape, SearchEnd, Survey, SurveyInput,
-    SurveyOptions, score_plan, survey,
+    NoObserver, OdometrySigma, PieceStatus, PostShape, SearchEnd, Survey, SurveyOptions,
+    score_plan, survey,
     trial::{
-        Comparison, Ends, ReadingNoise, RigidMotion, RoomKind, coverage, draw_place, draw_trial,
-        drift, generator, poses_along, simulate_rounds, simulate_sweeps, trial_world,
+        Comparison, Ends, ReadingNoise, RigidMotion, RoomKind, coverage, draw_place,
+        simulate_sweeps,
     },
 };
 
+use baselines::compare_methods;
+use course::Course;
 use explore::compare_choices;
 use intervals::{Intervals, count_intervals, print_intervals};
 use measure::{explained, median, reflecting_walls};
@@ -52,6 +56,8 @@ struct Settings {
     prints_walls: bool,
     /// Compares choices of the next stop.
     compares_choices: bool,
+    /// Compares other methods with the survey.
+    compares_methods: bool,
 }
 
 /// Figures of one room.
@@ -117,6 +123,9 @@ impl Trial {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let settings = Settings::from_args()?;
+    if settings.compares_methods {
+        return compare_methods(&settings);
+    }
     if settings.compares_choices {
         return compare_choices(&settings);
     }
@@ -143,50 +152,29 @@ const HEAD: &str = "| kind | rooms | complete | recall | precision | corner mm |
 held | true room | score within 5 | wrong observed m | outer recall | recall of walls met | faces found | posts found | wrong posts | determined | complete of these | CPU s | scenes |";
 
 fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn Error>> {
-    let mut random = generator(kind, seed);
-    let (room, course) = draw_trial(kind, settings.stops, &mut random)?;
-    let poses = settings.poses.map_or(course.clone(), |count| poses_along(&course, count));
-    let assumed = trial_world(room)?;
-    let world = settings.truth.applied(&assumed)?;
-    let odometry = drift(&poses, settings.odometry, &mut random);
-    let (mut sweeps, mut rounds) = (Vec::new(), Vec::new());
-    match &settings.array {
-        Some(array) => {
-            rounds = simulate_rounds(&world, array, &poses, settings.noise, &mut random)?;
-        }
-        None => {
-            sweeps = simulate_sweeps(&world, &poses, settings.beams, settings.noise, &mut random)?;
-        }
-    }
+    let mut course = Course::draw(kind, seed, settings)?;
     let held: Vec<Pose> = (0..HELD_PLACES)
         .map(|at| {
-            let place = draw_place(&world.scene, &mut random);
+            let place = draw_place(&course.world.scene, &mut course.random);
             Pose { x_m: place.x, y_m: place.y, heading_deg: 45.0 * at as f64 }
         })
         .collect();
-    let held_out = simulate_sweeps(&world, &held, settings.beams, settings.noise, &mut random)?;
-    for (sweep, pose) in sweeps.iter_mut().zip(&odometry) {
-        sweep.pose = *pose;
-    }
-    for (round, pose) in rounds.iter_mut().zip(&odometry) {
-        round.pose = *pose;
-    }
-    let readings = match settings.array {
-        Some(_) => SurveyInput::from(&rounds),
-        None => SurveyInput::from(&sweeps),
-    };
+    let (beams, noise) = (settings.beams, settings.noise);
+    let held_out = simulate_sweeps(&course.world, &held, beams, noise, &mut course.random)?;
+    let readings = course.readings();
+    let Course { assumed, world, poses, .. } = &course;
     let options = settings.survey_options();
     let start_s = cpu_s();
-    let found = survey(&assumed, readings, &options, &NoObserver)?;
+    let found = survey(assumed, readings, &options, &NoObserver)?;
     let seconds = cpu_s() - start_s;
     let truth: Vec<Ends> = world.scene.walls.iter().map(|wall| [wall.a, wall.b]).collect();
     let cylinders = world.scene.cylinders.iter();
     let true_posts: Vec<PostShape> =
         cylinders.map(|of| PostShape { center: of.center, radius_m: of.radius_m }).collect();
     // Plans are scored with the same sensor.
-    let scorer = if settings.fit.is_empty() { &assumed } else { &world };
-    let true_score = score_plan(scorer, readings, &options, (&truth, &true_posts), &poses)?;
-    let compared = Comparison::new(&found, &world.scene, &poses);
+    let scorer = if settings.fit.is_empty() { assumed } else { world };
+    let true_score = score_plan(scorer, readings, &options, (&truth, &true_posts), poses)?;
+    let compared = Comparison::new(&found, &world.scene, poses);
     let Comparison { motion, walls, recall, precision, corners_m, .. } = compared;
     let observed = observed(&found, &motion);
     let wrong: f64 = observed
@@ -201,9 +189,9 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
         print_posts(&found, &motion, &true_posts);
     }
     // The frame of the survey is the first pose of odometry, which is the true one.
-    let intervals = count_intervals(&found, &poses, &truth, &true_posts);
+    let intervals = count_intervals(&found, poses, &truth, &true_posts);
     let scene = found.scene("found", false).build()?;
-    let reflecting = reflecting_walls(&world, &poses, settings.beams)?;
+    let reflecting = reflecting_walls(world, poses, settings.beams)?;
     let (mut outer, mut inner, mut met) = (Vec::new(), Vec::new(), Vec::new());
     for (at, (wall, ends)) in world.scene.walls.iter().zip(&truth).enumerate() {
         let is_outer = wall.id.starts_with("wall");
@@ -238,8 +226,8 @@ fn run(kind: RoomKind, seed: u64, settings: &Settings) -> Result<Trial, Box<dyn 
         corners_m,
         position_m: compared.position_m,
         heading_deg: compared.heading_deg,
-        held: explained(&world, scene, &held_out, in_frame)?,
-        true_held: explained(&world, Scene::clone(&world.scene), &held_out, |sweep| sweep.pose)?,
+        held: explained(world, scene, &held_out, in_frame)?,
+        true_held: explained(world, Scene::clone(&world.scene), &held_out, |sweep| sweep.pose)?,
         fitted: settings.truth.deviations(&found),
         lead_nats: found.score - true_score,
         wrong_observed_m: wrong,
@@ -401,6 +389,7 @@ impl Settings {
             is_verbose: false,
             prints_walls: false,
             compares_choices: false,
+            compares_methods: false,
         };
         let mut args = std::env::args().skip(1);
         while let Some(name) = args.next() {
@@ -415,6 +404,10 @@ impl Settings {
                 }
                 "--next-view" => {
                     settings.compares_choices = true;
+                    continue;
+                }
+                "--baselines" => {
+                    settings.compares_methods = true;
                     continue;
                 }
                 "--no-odometry" => {
@@ -453,6 +446,7 @@ impl Settings {
                     let groups = value.split(',').map(|name| serde_json::from_value(name.into()));
                     settings.fit = groups.collect::<Result<_, _>>()?;
                 }
+                "--sigma-db" => settings.noise.sigma_db = value.parse()?,
                 "--sigma-m" => settings.noise.sigma_m = value.parse()?,
                 _ => return Err(format!("{name} is no option").into()),
             }
