@@ -121,6 +121,34 @@ fn final_estimate_recovers_poses_of_rounds() {
     }
 }
 
+/// A wrong first pose is corrected, although the frame of the survey is that pose: in its own frame,
+/// all other poses and walls are wrong.
+#[test]
+fn final_estimate_corrects_the_first_pose() {
+    let (corners, _, world, _) = true_rectangle();
+    let truth = poses_along(&stops(), 12);
+    let rounds = rounds(&world, &truth, &truth);
+    let (input, scores) = (SurveyInput::from(&rounds), PlanScores::default());
+    let sweeps = input.sweeps();
+    let workspace =
+        workspace(&world, (input, &sweeps), &options(), (&NoObserver, &scores)).expect("rounds");
+    let mut poses = truth.clone();
+    poses[0].x_m += 0.006;
+    poses[0].heading_deg += 1.0;
+    let (plan, walls) = LineArrangement::of_walls(&sides(&corners), &poses, workspace.reach_m());
+    let frame = poses[0];
+    let mut posed = PosedPlan { plan, walls, posts: Vec::new(), poses };
+    let judge = Judge::of(&workspace, &posed, 0.004);
+    polish(&mut posed, &judge).expect("an estimate");
+    assert_eq!(posed.poses[0], frame);
+    let found = posed.in_frame(&truth[0]).poses;
+    for (found, truth) in found.iter().zip(&truth) {
+        let off_m = found.position().distance(truth.position());
+        let off_deg = wrap_180(found.heading_deg - truth.heading_deg).abs();
+        assert!(off_m < 2e-3 && off_deg < 0.25, "{found:?} {truth:?}");
+    }
+}
+
 /// Arcs of transducers off the axis, from true ranges and bearings, give poses and lines.
 #[test]
 fn bundle_recovers_poses_from_transducers_off_the_axis() {

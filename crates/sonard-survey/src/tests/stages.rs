@@ -12,6 +12,7 @@ use crate::{
     odometry::Move,
     polish::polish,
     posed::PosedPlan,
+    post::PostShape,
     progress::NoObserver,
     search::{PlanSearch, initial_walls},
     slam::virtual_map_in_order,
@@ -125,6 +126,38 @@ fn polish_returns_to_the_true_room() {
     for (line, truth) in posed.plan.lines.iter().zip(&expected.lines) {
         let turn_deg = line.angle_to(truth).to_degrees();
         assert!(turn_deg < 0.03, "{turn_deg}");
+    }
+}
+
+/// Plan, posts and poses keep their distances in another frame, and return exactly.
+#[test]
+fn plan_moves_with_its_first_pose() {
+    let corners = rectangle();
+    let (plan, walls) = plan_of(&sides(&corners), &stops());
+    let post = PostShape { center: DVec2::new(1.0, 1.2), radius_m: 0.05 };
+    let posed = PosedPlan { plan, walls, posts: vec![post], poses: stops() };
+    let frame = Pose { x_m: -3.0, y_m: 7.5, heading_deg: 171.0 };
+    let moved = posed.clone().in_frame(&frame);
+    assert_eq!(moved.poses[0], frame);
+    let places = |of: &PosedPlan| {
+        let ends = of.plan.segments(&of.walls).into_iter().flat_map(|wall| [wall.a, wall.b]);
+        let poses = of.poses.iter().map(Pose::position);
+        ends.chain(poses).chain(of.posts.iter().map(|post| post.center)).collect::<Vec<_>>()
+    };
+    let back = moved.clone().in_frame(&posed.poses[0]);
+    let [before, after, back] = [&posed, &moved, &back].map(places);
+    assert!(before.len() > 12 && after.len() == before.len());
+    for (at, (own, moved)) in before.iter().zip(&after).enumerate() {
+        assert!(back[at].distance(*own) < 1e-12);
+        for (other, other_moved) in before.iter().zip(&after) {
+            let change_m = own.distance(*other) - moved.distance(*other_moved);
+            assert!(change_m.abs() < 1e-12, "{change_m}");
+        }
+    }
+    let turned_deg = wrap_180(frame.heading_deg - posed.poses[0].heading_deg);
+    for (own, moved) in posed.poses.iter().zip(&moved.poses) {
+        let change_deg = wrap_180(moved.heading_deg - own.heading_deg - turned_deg);
+        assert!(change_deg.abs() < 1e-9);
     }
 }
 
