@@ -307,7 +307,12 @@ impl<'a> Judge<'a> {
 
     /// Predicted readings of a sweep from a pose; `None` if the scene has more paths than the model
     /// follows.
-    fn predict(&self, simulator: &Simulator, sweep: usize, pose: &Pose) -> Option<Vec<Prediction>> {
+    pub(crate) fn predict(
+        &self,
+        simulator: &Simulator,
+        sweep: usize,
+        pose: &Pose,
+    ) -> Option<Vec<Prediction>> {
         let readings = &self.readings()[sweep];
         let point = simulator.at(pose.position());
         let of_beam = |beam: &Beam| {

@@ -1,9 +1,11 @@
-//! Next best view: the place from which a full turn resolves most of what a survey leaves open.
+//! Next best view: the pose from which a full turn of a stepper, or a round of an array, resolves most of
+//! what a survey leaves open.
 
 mod free_space;
 mod gaps;
 mod hypotheses;
 mod overlap;
+mod pattern;
 
 use rayon::prelude::*;
 use sonard_model::{
@@ -13,7 +15,7 @@ use sonard_model::{
 
 use crate::{
     alternatives::Assessment,
-    judge::{Judge, outcome_of},
+    judge::Judge,
     options::SurveyOptions,
     posed::PosedPlan,
     readings::Outcome,
@@ -22,6 +24,7 @@ use crate::{
 use free_space::FreeSpace;
 use hypotheses::{Hypothesis, hypotheses};
 use overlap::ReadingOverlap;
+use pattern::ViewPattern;
 
 /// Entropy of the hypotheses up to which nothing is open, nats: the plan has a probability of 98 %.
 const MIN_OPEN_NATS: f64 = 0.1;
@@ -30,10 +33,10 @@ const MIN_GAIN_NATS: f64 = 0.02;
 /// Share of the largest gain from which the place farthest from all stops is preferred: it resolves
 /// as much, and most of what no hypothesis contains.
 const NEAR_BEST: f64 = 0.97;
-/// Angle between predicted beams, degrees: half of an arc.
-const STEP_DEG: f64 = 3.6;
-/// Maximum number of predicted sweeps, all places and hypotheses together.
-const MAX_SWEEPS: usize = 3000;
+/// Maximum number of places.
+const MAX_PLACES: usize = 3000;
+/// Maximum number of predicted beams, all poses and hypotheses together.
+const MAX_BEAMS: usize = 300_000;
 /// Share of the gain from which a part is listed.
 const MIN_SHARE: f64 = 0.02;
 
@@ -44,7 +47,7 @@ const MIN_SHARE: f64 = 0.02;
 /// probabilities are by their scores, for gaps by the likelihood. Where no place decides among them
 /// but arcs are unexplained, none of them is right, and the view is the place farthest from all
 /// stops. The result is independent of the number of threads; it has no view if nothing is open, no
-/// place resolves anything, the readings are those of an array, or the observer cancelled.
+/// place resolves anything, or the observer cancelled.
 pub(crate) fn find_next_view(
     posed: &PosedPlan,
     judge: &Judge,
@@ -55,9 +58,6 @@ pub(crate) fn find_next_view(
     let hypotheses = hypotheses(posed, judge, assessment, posts);
     let weights = Weights::of(&hypotheses);
     let open_nats = weights.entropy_nats();
-    if judge.workspace.is_array {
-        return (open_nats, None);
-    }
     let is_open = open_nats > MIN_OPEN_NATS;
     let forecast = is_open.then(|| Forecast::new(judge, &hypotheses, &weights, options)).flatten();
     let view = forecast.and_then(|forecast| best_view(&forecast, posed, judge, options));
@@ -77,7 +77,7 @@ fn farthest_view(posed: &PosedPlan, judge: &Judge, options: &SurveyOptions) -> O
         return None;
     }
     let to_stops_m = |place: &DVec2| distance_to_stops_m(*place, posed);
-    let places = reachable_places(posed, judge, options.view_reach_m, MAX_SWEEPS).into_iter();
+    let places = reachable_places(posed, judge, options.view_reach_m, MAX_PLACES).into_iter();
     let place = places.max_by(|a, b| to_stops_m(a).total_cmp(&to_stops_m(b)))?;
     pose_at(place, posed)
 }
@@ -116,30 +116,31 @@ fn best_view(
     judge: &Judge,
     options: &SurveyOptions,
 ) -> Option<NextView> {
-    let max_count = MAX_SWEEPS / forecast.simulators.len().max(1);
-    let places = reachable_places(posed, judge, options.view_reach_m, max_count);
+    let per_place = forecast.simulators.len() * forecast.pattern.beams_per_place();
+    let places = reachable_places(posed, judge, options.view_reach_m, MAX_BEAMS / per_place.max(1));
+    let at_place = |place: &DVec2| forecast.pattern.poses_at(pose_at(*place, posed));
+    let poses: Vec<Pose> = places.iter().flat_map(at_place).collect();
     let is_cancelled = || judge.workspace.observer.is_cancelled();
-    let expected = |place: &DVec2| forecast.terms_at(*place).filter(|_| !is_cancelled());
-    let all: Vec<Option<Vec<f64>>> = places.par_iter().map(expected).collect();
+    let expected = |pose: &Pose| forecast.terms_at(pose).filter(|_| !is_cancelled());
+    let all: Vec<Option<Vec<f64>>> = poses.par_iter().map(expected).collect();
     if is_cancelled() {
         return None;
     }
     let gain_nats = |terms: &[f64]| terms.iter().sum::<f64>();
     let views = || {
-        let found = places.iter().zip(&all);
-        found.filter_map(|(place, terms)| Some((*place, terms.as_deref()?)))
+        let found = poses.iter().zip(&all);
+        found.filter_map(|(pose, terms)| Some((*pose, terms.as_deref()?)))
     };
     let most_nats = views().map(|(_, terms)| gain_nats(terms)).fold(0.0, f64::max);
-    let to_stops_m = |place: DVec2| distance_to_stops_m(place, posed);
-    let (place, terms) = views()
+    let to_stops_m = |pose: &Pose| distance_to_stops_m(pose.position(), posed);
+    let (pose, terms) = views()
         .filter(|(_, terms)| gain_nats(terms) >= NEAR_BEST * most_nats)
-        .max_by(|a, b| to_stops_m(a.0).total_cmp(&to_stops_m(b.0)))
+        .max_by(|a, b| {
+            let is_farther = to_stops_m(&a.0).total_cmp(&to_stops_m(&b.0));
+            is_farther.then(gain_nats(a.1).total_cmp(&gain_nats(b.1)))
+        })
         .filter(|_| most_nats > MIN_GAIN_NATS)?;
-    Some(NextView {
-        pose: pose_at(place, posed)?,
-        gain_nats: gain_nats(terms),
-        resolves: forecast.resolved(terms),
-    })
+    Some(NextView { pose, gain_nats: gain_nats(terms), resolves: forecast.resolved(terms) })
 }
 
 /// Probabilities of hypotheses.
@@ -165,14 +166,13 @@ struct Forecast<'a> {
     weights: &'a [f64],
     simulators: Vec<Simulator>,
     overlap: ReadingOverlap,
-    /// Number of neighbouring predicted beams that count as one.
-    beams_per_arc: f64,
+    pattern: ViewPattern<'a>,
 }
 
 impl<'a> Forecast<'a> {
     /// Forecast of given hypotheses; `None` if the scene of one is invalid.
     fn new(
-        judge: &Judge,
+        judge: &'a Judge<'a>,
         hypotheses: &'a [Hypothesis],
         weights: &'a Weights,
         options: &SurveyOptions,
@@ -183,11 +183,11 @@ impl<'a> Forecast<'a> {
             weights: &weights.0,
             simulators: hypotheses.iter().map(simulator).collect::<Option<_>>()?,
             overlap: ReadingOverlap::new(judge.sigma_m, judge.workspace.reach_m()),
-            beams_per_arc: (options.arc_deg / STEP_DEG).max(1.0),
+            pattern: ViewPattern::new(judge, options),
         })
     }
 
-    /// Terms of the expected decrease of entropy by a full turn at a place, nats, one for each
+    /// Terms of the expected decrease of entropy by the readings from a pose, nats, one for each
     /// hypothesis: their sum is the gain. `None` if a scene has more paths than the model follows.
     ///
     /// The gain is a lower bound of the mutual information of hypothesis and readings,
@@ -197,16 +197,16 @@ impl<'a> Forecast<'a> {
     /// the entropy, and is exact where hypotheses give equal readings or exclude each other.
     /// Readings have the likelihood of the score, those of an arc as one. The terms of the plan
     /// itself are divided among the other hypotheses in proportion to their parts of it.
-    fn terms_at(&self, place: DVec2) -> Option<Vec<f64>> {
+    fn terms_at(&self, pose: &Pose) -> Option<Vec<f64>> {
         let sweeps: Vec<Vec<Outcome>> = self
             .simulators
             .iter()
-            .map(|simulator| predict_turn(simulator, place))
+            .map(|simulator| self.pattern.predict(simulator, pose))
             .collect::<Option<_>>()?;
         let overlap = |a: usize, b: usize| {
             let pairs = sweeps[a].iter().zip(&sweeps[b]);
             let nats: f64 = pairs.map(|(a, b)| self.overlap.distance_nats(*a, *b)).sum();
-            (-nats / self.beams_per_arc).exp()
+            (-nats / self.pattern.beams_per_arc()).exp()
         };
         // Parts of the hypotheses in what is distinct from one of them.
         let distinct = |of: usize| -> Vec<f64> {
@@ -241,11 +241,3 @@ impl<'a> Forecast<'a> {
 
 /// Index of the plan itself among its hypotheses.
 const PLAN: usize = 0;
-
-/// Predicted outcomes of a full turn.
-fn predict_turn(simulator: &Simulator, place: DVec2) -> Option<Vec<Outcome>> {
-    let point = simulator.at(place);
-    let count = (360.0 / STEP_DEG) as usize;
-    let direction_rad = |at: usize| (STEP_DEG * at as f64).to_radians();
-    (0..count).map(|at| point.ping(direction_rad(at)).ok().map(|of| outcome_of(&of))).collect()
-}

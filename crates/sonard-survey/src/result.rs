@@ -222,10 +222,11 @@ pub struct AlternativePlan {
     pub probability: f64,
 }
 
-/// Pose of a full turn that resolves most of what a survey leaves open.
+/// Pose of a full turn, or of a round of an array, that resolves most of what a survey leaves open.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct NextView {
-    /// Place, reachable by a straight move from a stop, with the heading of the nearest stop.
+    /// Place, reachable by a straight move from a stop, with the heading of the nearest stop; of an
+    /// array, the heading that resolves most.
     pub pose: Pose,
     /// Expected decrease of the entropy by the readings there, nats; 0 for a view chosen because of
     /// unexplained arcs.

@@ -408,10 +408,10 @@ class ResolvedPart:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class NextView:
-    """Pose of a full turn that resolves most of what a survey leaves open."""
+    """Pose of a full turn, or of a round of an array, that resolves most of what is open."""
 
     pose: NDArray[np.float64]
-    """Place and a heading, which is irrelevant for a full turn: x and y in metres, degrees."""
+    """Place, x and y in metres, and heading in degrees, which is irrelevant for a full turn."""
     gain_nats: float
     """Expected decrease of ``open_nats`` by the readings there, nats; 0 for a view chosen because of unexplained arcs."""
     resolves: tuple[ResolvedPart, ...]

@@ -5,24 +5,26 @@ use crate::survey::{NextView, OpenPart, ResolvedPart, Survey, SurveyCourse};
 /// Place and expected gain of the next view in a sentence, and one for each part that it resolves.
 pub(super) fn sentences(course: &SurveyCourse, found: &Survey) -> (String, Vec<String>) {
     let open = format!("{:.2} nats", found.open_nats);
-    if let SurveyCourse::Rounds(_) = course {
-        return ("none: it is computed for a ranger on a stepper only".to_owned(), Vec::new());
-    }
+    let (readings, heading) = match course {
+        SurveyCourse::Sweeps(_) => ("a full turn", None),
+        SurveyCourse::Rounds(_) => {
+            ("a round", found.next_view.as_ref().map(|of| of.pose.heading_deg))
+        }
+    };
+    let heading = heading.map_or_else(String::new, |deg| format!(" with heading {deg:.0} degrees"));
     match &found.next_view {
         None if found.open_nats < 0.005 => ("none: nothing is open".to_owned(), Vec::new()),
         None => (format!("none: no reachable place resolves the {open} that are open"), Vec::new()),
         Some(NextView { pose, gain_nats, resolves }) => {
-            let at = place([pose.x_m, pose.y_m]);
+            let at = format!("{readings} at {}{heading}", place([pose.x_m, pose.y_m]));
             if let [ResolvedPart { part: OpenPart::UnexplainedArcs { count }, .. }] = resolves[..] {
                 let arcs =
                     if count == 1 { "1 arc is".to_owned() } else { format!("{count} arcs are") };
-                let text = format!(
-                    "a full turn at {at}, far from the stops: {arcs} unexplained by the plans found"
-                );
+                let text =
+                    format!("{at}, far from the stops: {arcs} unexplained by the plans found");
                 return (text, Vec::new());
             }
-            let text =
-                format!("a full turn at {at} resolves {gain_nats:.2} of {open} that are open");
+            let text = format!("{at} resolves {gain_nats:.2} of {open} that are open");
             (text, resolves.iter().map(part).collect())
         }
     }

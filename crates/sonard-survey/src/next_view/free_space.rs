@@ -16,7 +16,7 @@ const CLEAR_M: f64 = 0.25;
 const MIN_MOVE_M: f64 = 0.15;
 /// Minimum spacing of places, metres.
 const SPACING_M: f64 = 0.2;
-/// Angle from a move within which readings show an obstacle on it, degrees.
+/// Minimum angle from a move within which readings show an obstacle on it, degrees.
 const AHEAD_DEG: f64 = 12.0;
 
 /// Free floor around the stops of a course.
@@ -69,9 +69,10 @@ impl FreeSpace<'_> {
         let from = pose.position();
         let clear_m = CLEAR_M.min(self.clearance_m([from, from]) - 1e-9);
         let needed_m = from.distance(to) + CLEAR_M;
+        let ahead_deg = AHEAD_DEG.max(0.5 * readings.step_deg);
         let is_blocking = |(azimuth_deg, outcome): (f64, Outcome)| {
             let beam = DVec2::from_angle(pose.direction_rad(azimuth_deg));
-            let is_ahead = signed_angle_rad(beam, to - from).abs() < AHEAD_DEG.to_radians();
+            let is_ahead = signed_angle_rad(beam, to - from).abs() < ahead_deg.to_radians();
             is_ahead && matches!(outcome, Outcome::Echo(range_m) if range_m < needed_m)
         };
         let mut beams = readings.beams.iter().map(|beam| (beam.azimuth_deg, beam.outcome));

@@ -2,12 +2,21 @@
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
+use sonard_inverse::{ArrayFiring, ArrayRound};
 use sonard_model::geometry::distance_to_segment;
 
 use super::*;
 use crate::{
-    OpenPart, alternatives::Assessment, arrangement::Segment, judge::Judge, moves::crosses,
-    next_view::find_next_view, posed::PosedPlan, progress::NoObserver, survey::survey,
+    OpenPart,
+    alternatives::Assessment,
+    arrangement::Segment,
+    input::SurveyInput,
+    judge::{Judge, outcome_of},
+    moves::crosses,
+    next_view::find_next_view,
+    posed::PosedPlan,
+    progress::NoObserver,
+    survey::survey,
 };
 
 /// Point in the frame of the rectangle.
@@ -91,6 +100,53 @@ fn view_is_on_the_side_that_decides() {
     let distances_m = poses.map(|pose| pose.position().distance(found.pose.position()));
     assert!(distances_m.into_iter().all(|distance_m| distance_m > 1.0), "{found:?}");
     assert_eq!((found.gain_nats, find(Vec::new(), 2, 0.0).1), (0.0, None));
+}
+
+/// A single ranger, which points away from a corner that may be cut off, decides when turned to it.
+#[test]
+fn view_of_an_array_has_the_heading_that_decides() {
+    let walls = sides(&rectangle());
+    let corner = at(2.0, 0.4);
+    let hidden = [[at(2.0, 0.0), corner], [corner, at(SIZE_M[0], 0.4)]];
+    let mut world = world_of(&walls);
+    world.options.max_range_m = Some(1.6);
+    let away = |step: u32| Pose {
+        heading_deg: TURN_RAD.to_degrees() + 180.0,
+        ..pose(0.6, 0.5 + 0.2 * f64::from(step))
+    };
+    let poses: Vec<Pose> = (0..6).map(away).collect();
+    let ahead = |(number, pose): (u128, &Pose)| {
+        let position = DVec2::new(0.1, 0.0);
+        let place = pose.position() + pose.rotate_to_world(position);
+        let own = Pose { x_m: place.x, y_m: place.y, ..*pose };
+        let outcome = sweeps(&world, &[own], &[own])[0].beams[0].outcome;
+        let firings = vec![ArrayFiring { position, azimuth_deg: 0.0, outcome }];
+        ArrayRound { scan: Uuid::from_u128(number), pose: *pose, firings }
+    };
+    let rounds: Vec<ArrayRound> = (1..).zip(&poses).map(ahead).collect();
+    let (input, scores) = (SurveyInput::from(&rounds), PlanScores::default());
+    let swept = input.sweeps();
+    let workspace =
+        workspace(&world, (input, &swept), &options(), (&NoObserver, &scores)).expect("rounds");
+    let judge = Judge::new(&workspace, &poses, 0.004);
+    let (plan, set) = plan_of(&[&walls[..], &hidden].concat(), &poses);
+    let without: Vec<Segment> =
+        walls.iter().enumerate().map(|(line, &[a, b])| Segment { line, a, b }).collect();
+    let posed = PosedPlan { plan, walls: set, posts: Vec::new(), poses };
+    let alternatives = vec![(without.clone(), 0.0)];
+    let assessment = Assessment { walls: Vec::new(), alternatives, better: None };
+    let options = SurveyOptions { view_reach_m: 1.8, ..options() };
+    let (open_nats, found) = find_next_view(&posed, &judge, &assessment, (&[], 0), &options);
+    let found = found.expect("a view");
+    assert!(found.gain_nats > 0.5 * open_nats, "{found:?} {open_nats}");
+    let outcome_in = |segments: &[Segment], pose: &Pose| {
+        let simulator = judge.simulator_of(segments).expect("a scene");
+        outcome_of(&judge.predict(&simulator, 0, pose).expect("few paths")[0])
+    };
+    let with = posed.plan.segments(&posed.walls);
+    assert_ne!(outcome_in(&with, &found.pose), outcome_in(&without, &found.pose));
+    let back = Pose { heading_deg: found.pose.heading_deg + 180.0, ..found.pose };
+    assert_eq!(outcome_in(&with, &back), outcome_in(&without, &back));
 }
 
 /// Corners of an L in the frame of the rectangle.
