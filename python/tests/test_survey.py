@@ -118,7 +118,7 @@ def test_array_on_a_moving_robot(command: Command, tmp_path: Path) -> None:
     np.testing.assert_allclose(sorted(wall.length_m() for wall in found.walls), [2.3, 2.3, 2.8, 2.8], atol=0.01)
     np.testing.assert_allclose(found.poses, poses, atol=0.6)
     np.testing.assert_allclose(found.poses[:, :2], poses[:, :2], atol=0.01)
-    assert [len(causes) for causes in found.causes] == [12] * 13 and found.next_view is None
+    assert [len(causes) for causes in found.causes] == [12] * 13
     # Bare ranges in the order of the firings, as measured by a robot.
     ranges = np.where(rounds["status"] == sonard.Status.ECHO, rounds["range_m"], np.inf)
     again = sonard.survey(ranges, odometry, array=model.array, sensor=model.sensor, max_range_m=4.0)
@@ -135,12 +135,13 @@ def test_array_on_a_moving_robot(command: Command, tmp_path: Path) -> None:
 
     with pytest.raises(ValueError, match="poses must be omitted for scans of an array"):
         sonard.survey(sonard.read_log(log), np.zeros((len(sonard.read_log(log)), 3)))
-    for words, arguments, options in [
+    wrong: list[tuple[str, tuple[Any, ...], dict[str, Any]]] = [
         ("array must be omitted for scans", (sonard.read_log(log),), {"array": "ring-12"}),
         ("azimuths_deg must be omitted with an array", (rounds, odometry), {"array": "ring-12", "azimuths_deg": [0.0]}),
         ("sweeps[0]: 11 readings, but a round of the array has 12 firings", (rounds[:, :11], odometry), {"array": "ring-12"}),
-        ("round_spacing_m is 9.0: it must be from 0 to 5", (rounds, odometry), {"array": "ring-12", "round_spacing_m": 9.0}),
-    ]:
+        ("round_spacing_m is 9: it must be from 0 to 5", (rounds, odometry), {"array": "ring-12", "round_spacing_m": 9.0}),
+    ]
+    for words, arguments, options in wrong:
         with pytest.raises(ValueError) as caught:
             sonard.survey(*arguments, **options)
         assert words in str(caught.value)
