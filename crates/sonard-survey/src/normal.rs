@@ -80,6 +80,11 @@ impl NormalEquations {
         Some(Cholesky::new(information)?.solve(&self.gradient))
     }
 
+    /// Gain of a step that the equations expect, nats.
+    pub(crate) fn expected_gain(&self, step: &DVector<f64>) -> f64 {
+        self.gradient.dot(step) - 0.5 * step.dot(&(&self.information * step))
+    }
+
     /// Covariance of the parameters; `None` if they are not determined.
     pub(crate) fn covariance(&self) -> Option<DMatrix<f64>> {
         Some(Cholesky::new(self.information.clone())?.inverse())

@@ -53,30 +53,24 @@ impl<'a> PoseClimb<'a> {
     /// likelier.
     fn improved(&self, sweep: usize, poses: &[Pose]) -> Option<Pose> {
         const MAX_STEPS: usize = 8;
-        /// Gain below which no further step is made, nats.
-        const MIN_GAIN: f64 = 0.01;
-        /// Damping beyond which steps are too short to gain.
-        const MAX_DAMPING: f64 = 1e3;
+        /// Expected gain below which no further step is made, nats.
+        const MIN_GAIN: f64 = 0.005;
         let start = poses[sweep];
         let mut pose = start;
         let (mut value, mut normal) = self.linearize(sweep, pose, poses)?;
         let mut damping = 1e-3;
         for _ in 0..MAX_STEPS {
             let step = normal.step(damping)?;
+            if normal.expected_gain(&step) < MIN_GAIN {
+                break;
+            }
             let mut tried = pose;
             move_pose(&mut tried, [step[0], step[1], step[2]]);
             let (at, equations) = self.linearize(sweep, tried, poses)?;
-            let gain = at - value;
-            if gain <= 0.0 {
+            if at > value {
+                (pose, value, normal, damping) = (tried, at, equations, 0.1 * damping);
+            } else {
                 damping *= 10.0;
-                if damping > MAX_DAMPING {
-                    break;
-                }
-                continue;
-            }
-            (pose, value, normal, damping) = (tried, at, equations, 0.1 * damping);
-            if gain < MIN_GAIN {
-                break;
             }
         }
         (pose != start).then_some(pose)
