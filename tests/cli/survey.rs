@@ -396,7 +396,7 @@ fn array_on_a_moving_robot_gives_the_room() {
     let (log, out) = (ring_log(folder.path()), path(folder.path(), "out"));
     let printed = succeeds(&["survey", &log, "--max-range", "4", "--out", &out]);
     assert!(printed.starts_with("4 walls from 13 rounds"), "{printed}");
-    assert!(printed.contains("next view: none: it is computed for a ranger on a stepper only"));
+    assert!(printed.contains("next view: none: no reachable place resolves"), "{printed}");
     let text = fs::read_to_string(format!("{out}/survey.json")).expect("a survey");
     let survey: Value = serde_json::from_str(&text).expect("JSON");
     assert_sides(&survey, 0.02);
