@@ -18,8 +18,8 @@ use crate::{
 };
 
 /// Factor of the standard deviations by the information matrix. It assumes a parabola, while arcs end
-/// and echoes vanish abruptly: in simulated rooms its 95 % intervals hold 82 to 94 % of the true
-/// poses, walls and corners.
+/// and echoes vanish abruptly: of an array in simulated rooms its 95 % intervals hold 83 to 90 % of
+/// the true poses, walls and corners, and 96 to 100 % with this factor.
 const WIDENED: f64 = 1.3;
 const MAX_STEPS: usize = 20;
 /// Expected gain below which no further step is made, nats.

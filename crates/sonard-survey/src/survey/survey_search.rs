@@ -476,8 +476,11 @@ impl<'a> SurveySearch<'a> {
         let covariance = polish(&mut self.posed, judge);
         match before {
             Some((posed, score)) if self.score_now(judge.sigma_m) < score => self.posed = posed,
-            Some(_) => (),
-            None => self.covariance = covariance.or_else(|| self.covariance.take()),
+            // Few arcs of an array have more than one beam, on which that of a refinement depends.
+            _ if self.workspace.is_array => {
+                self.covariance = covariance.or_else(|| self.covariance.take());
+            }
+            _ => (),
         }
     }
 
