@@ -90,16 +90,34 @@ fn ranges_of_walls_are_those_from_the_rangers() {
     assert!(compared > 8, "{compared}");
 }
 
-/// The final estimate predicts each ranger where it is.
-#[test]
-fn final_estimate_recovers_poses_of_rounds() {
+/// Estimate by the likelihood of rounds at the true poses, from others in the true rectangle.
+fn estimate(truth: &[Pose], poses: Vec<Pose>) -> PosedPlan {
     let (corners, _, world, _) = true_rectangle();
-    let truth = poses_along(&stops(), 12);
-    let rounds = rounds(&world, &truth, &truth);
+    let rounds = rounds(&world, truth, truth);
     let (input, scores) = (SurveyInput::from(&rounds), PlanScores::default());
     let sweeps = input.sweeps();
     let workspace =
         workspace(&world, (input, &sweeps), &options(), (&NoObserver, &scores)).expect("rounds");
+    let (plan, walls) = LineArrangement::of_walls(&sides(&corners), &poses, workspace.reach_m());
+    let mut posed = PosedPlan { plan, walls, posts: Vec::new(), poses };
+    let judge = Judge::of(&workspace, &posed, 0.004);
+    polish(&mut posed, &judge).expect("an estimate");
+    posed
+}
+
+fn assert_near(found: &[Pose], truth: &[Pose], max_m: f64) {
+    for (found, truth) in found.iter().zip(truth) {
+        let off_m = found.position().distance(truth.position());
+        let off_deg = wrap_180(found.heading_deg - truth.heading_deg).abs();
+        // Few rangers are near their threshold, by which headings are determined.
+        assert!(off_m < max_m && off_deg < 0.25, "{found:?} {truth:?}");
+    }
+}
+
+/// The final estimate predicts each ranger where it is.
+#[test]
+fn final_estimate_recovers_poses_of_rounds() {
+    let truth = poses_along(&stops(), 12);
     let off = |(at, pose): (usize, &Pose)| {
         let by = if at == 0 { 0.0 } else { f64::from(at as u32 % 3) - 1.0 };
         Pose {
@@ -108,45 +126,22 @@ fn final_estimate_recovers_poses_of_rounds() {
             heading_deg: pose.heading_deg + 0.4 * by,
         }
     };
-    let poses: Vec<Pose> = truth.iter().enumerate().map(off).collect();
-    let (plan, walls) = LineArrangement::of_walls(&sides(&corners), &poses, workspace.reach_m());
-    let mut posed = PosedPlan { plan, walls, posts: Vec::new(), poses };
-    let judge = Judge::of(&workspace, &posed, 0.004);
-    polish(&mut posed, &judge).expect("an estimate");
-    for (found, truth) in posed.poses.iter().zip(&truth) {
-        let off_m = found.position().distance(truth.position());
-        let off_deg = wrap_180(found.heading_deg - truth.heading_deg).abs();
-        // Few rangers are near their threshold, by which headings are determined.
-        assert!(off_m < 2e-4 && off_deg < 0.25, "{found:?} {truth:?}");
-    }
+    let found = estimate(&truth, truth.iter().enumerate().map(off).collect());
+    assert_near(&found.poses, &truth, 2e-4);
 }
 
 /// A wrong first pose is corrected, although the frame of the survey is that pose: in its own frame,
 /// all other poses and walls are wrong.
 #[test]
 fn final_estimate_corrects_the_first_pose() {
-    let (corners, _, world, _) = true_rectangle();
     let truth = poses_along(&stops(), 12);
-    let rounds = rounds(&world, &truth, &truth);
-    let (input, scores) = (SurveyInput::from(&rounds), PlanScores::default());
-    let sweeps = input.sweeps();
-    let workspace =
-        workspace(&world, (input, &sweeps), &options(), (&NoObserver, &scores)).expect("rounds");
     let mut poses = truth.clone();
     poses[0].x_m += 0.006;
     poses[0].heading_deg += 1.0;
-    let (plan, walls) = LineArrangement::of_walls(&sides(&corners), &poses, workspace.reach_m());
     let frame = poses[0];
-    let mut posed = PosedPlan { plan, walls, posts: Vec::new(), poses };
-    let judge = Judge::of(&workspace, &posed, 0.004);
-    polish(&mut posed, &judge).expect("an estimate");
-    assert_eq!(posed.poses[0], frame);
-    let found = posed.in_frame(&truth[0]).poses;
-    for (found, truth) in found.iter().zip(&truth) {
-        let off_m = found.position().distance(truth.position());
-        let off_deg = wrap_180(found.heading_deg - truth.heading_deg).abs();
-        assert!(off_m < 2e-3 && off_deg < 0.25, "{found:?} {truth:?}");
-    }
+    let found = estimate(&truth, poses);
+    assert_eq!(found.poses[0], frame);
+    assert_near(&found.in_frame(&truth[0]).poses, &truth, 2e-3);
 }
 
 /// Arcs of transducers off the axis, from true ranges and bearings, give poses and lines.
