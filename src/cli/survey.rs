@@ -271,8 +271,7 @@ fn find(args: &Args, input: &Input, scores: &PlanScores) -> Result<Survey, Failu
     };
     let bar = progress::spinner(&format!("survey of {}:", course::count(&input.course)));
     let observer = Observer { bar: bar.clone(), interrupts };
-    let found =
-        resume_survey(&input.world, input.course.input(), &args.options(), scores, &observer);
+    let found = resume_survey(&input.world, &input.course, &args.options(), scores, &observer);
     bar.finish_and_clear();
     found.map_err(|error| failure_from(&error))
 }

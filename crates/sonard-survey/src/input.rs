@@ -72,20 +72,14 @@ impl SurveyCourse {
             is_kept
         });
     }
-
-    /// Readings as the input of a survey.
-    #[must_use]
-    pub fn input(&self) -> SurveyInput<'_> {
-        match self {
-            Self::Sweeps(sweeps) => sweeps.into(),
-            Self::Rounds(rounds) => rounds.into(),
-        }
-    }
 }
 
 impl<'a> From<&'a SurveyCourse> for SurveyInput<'a> {
     fn from(course: &'a SurveyCourse) -> Self {
-        course.input()
+        match course {
+            SurveyCourse::Sweeps(sweeps) => sweeps.into(),
+            SurveyCourse::Rounds(rounds) => rounds.into(),
+        }
     }
 }
 
