@@ -36,6 +36,7 @@ pub use options::{
     PathOptions,
 };
 pub use path::{Diffractor, Edge, Interaction, Mechanism, Path, Reflector};
+pub use paths::{EchoChange, EchoSet};
 pub use prediction::Prediction;
 pub use simulator::{ModelError, Simulator, receiver, sensor_z_m};
 

@@ -52,14 +52,14 @@ pub(crate) fn assess(
     covariance: Option<&PlanCovariance>,
 ) -> Assessment {
     let plan = &posed.plan;
-    let best = ScoredPlan { walls: posed.walls.clone(), score: judge.score(plan, &posed.walls) };
+    let best = ScoredPlan::new(plan, judge, posed.walls.clone());
     let observed = observed_stretches(plan, &best.walls, judge);
     let mut assessment = Assessment { walls: Vec::new(), alternatives: Vec::new(), better: None };
     for (run, observed) in plan.runs(&best.walls).into_iter().zip(observed) {
         let off: Vec<(usize, bool)> =
             (run.first..=run.last).map(|at| (plan.piece(run.line, at), false)).collect();
-        let without = best.walls.changed(&off);
-        let evidence_nats = best.score - judge.score(plan, &without);
+        let without = best.with_walls(plan, judge, best.walls.changed(&off));
+        let evidence_nats = best.score - without.score;
         let other = (evidence_nats < CERTAIN_NATS)
             .then(|| best_without(plan, judge, without, &best.walls, &run));
         let lead_nats = other.as_ref().map_or(evidence_nats, |other| best.score - other.score);
@@ -107,7 +107,7 @@ impl Assessment {
 fn best_without(
     plan: &LineArrangement,
     judge: &Judge,
-    without: PieceSet,
+    without: ScoredPlan,
     walls: &PieceSet,
     run: &Run,
 ) -> ScoredPlan {
@@ -135,8 +135,10 @@ fn pieces(
     for at in run.first..=run.last {
         let piece = plan.piece(run.line, at);
         let is_implied = || {
-            let without = judge.score(plan, &best.walls.changed(&[(piece, false)]));
-            is_needed && best.score - without > IMPLIED_NATS
+            let without = best.walls.changed(&[(piece, false)]);
+            let floor = best.score - IMPLIED_NATS;
+            is_needed
+                && best.score_of(plan, judge, &without, floor).is_none_or(|without| without < floor)
         };
         let [from_m, to_m] = [at, at + 1].map(|cut| plan.cuts[run.line][cut].along_m);
         for (range_m, is_observed) in split([from_m, to_m], observed) {

@@ -5,7 +5,7 @@ use sonard_model::geometry::{DVec2, distance_to_segment, encloses};
 use crate::{
     arc::Arc,
     arrangement::{LineArrangement, Segment, free_ends},
-    judge::Judge,
+    judge::{Judge, ReferencePlan, ScoreContext, UNSCORED},
     line::Line,
     posed::PosedPlan,
     ranking::{climbed, ranked},
@@ -50,7 +50,8 @@ pub(crate) fn with_box(posed: &PosedPlan, judge: &Judge, left: &[&Arc]) -> Optio
     let walls = posed.plan.segments(&posed.walls);
     let before = judge.score_segments(&walls);
     let faces = faces(posed, &walls, left);
-    let found = faces.into_iter().filter_map(|face| grown(&face, &walls, judge));
+    let plan = BoxedPlan { walls: &walls, reference: ReferencePlan::new(judge, &walls)? };
+    let found = faces.into_iter().filter_map(|face| plan.grown(&face, judge));
     let (score, shape) = found.max_by(|a, b| a.0.total_cmp(&b.0))?;
     (score > before + MIN_GAIN).then(|| built(posed, &walls, &shape, judge.workspace.reach_m()))
 }
@@ -81,81 +82,106 @@ fn faces(posed: &PosedPlan, walls: &[Segment], left: &[&Arc]) -> Vec<BoxShape> {
     of_walls.chain(of_arcs).take(MAX_FACES).collect()
 }
 
-/// Likeliest box behind a face, on either side of it.
-fn grown(face: &BoxShape, walls: &[Segment], judge: &Judge) -> Option<(f64, BoxShape)> {
-    let rough = judge.with_sigma(judge.workspace.errors.sigma_m(ROUGH_SIGMA_M));
-    let count = ((SIDE_M[1] - SIDE_M[0]) / STEP_M) as i32;
-    let depth = |at: i32| {
-        let depth_m = SIDE_M[0] + STEP_M * f64::from(at.abs() - 1);
-        BoxShape { depth_m: depth_m.copysign(f64::from(at)), ..face.clone() }
-    };
-    let depths = (-count..=count).filter(|at| *at != 0).map(depth);
-    let mut starts = ranked(depths.collect(), |shape| score_of(shape, walls, &rough));
-    starts.truncate(STARTS);
-    let searched = starts.into_iter().map(|(score, shape)| {
-        let ends = ends_of(shape, walls, &rough, score);
-        fine(ends, walls, judge)
-    });
-    searched.max_by(|a, b| a.0.total_cmp(&b.0))
+/// Walls to which a box is added.
+struct BoxedPlan<'w> {
+    walls: &'w [Segment],
+    /// Predictions of a plan that differs little.
+    reference: ReferencePlan,
 }
 
-/// Box with the likeliest ends of its face, one after the other, twice.
-fn ends_of(from: BoxShape, walls: &[Segment], rough: &Judge, score: f64) -> BoxShape {
-    let (mut best, mut best_score) = (from, score);
-    let [inwards, outwards] = END_SPAN_M.map(|span_m| (span_m / STEP_M) as i32);
-    for _ in 0..2 {
-        for is_to in [true, false] {
-            let with = |at: i32| {
-                let by_m = STEP_M * f64::from(at);
-                let mut shape = best.clone();
-                if is_to {
-                    shape.to_m += by_m;
-                } else {
-                    shape.from_m -= by_m;
+impl BoxedPlan<'_> {
+    /// Plan that is predicted by that with a box, for a judge; `None` if the scene has more paths than
+    /// the model follows.
+    fn near(&self, shape: &BoxShape, judge: &Judge) -> Option<Self> {
+        let reference = self.reference.rescored(judge);
+        let reference = reference.followed_by(judge, &shape.placed(self.walls))?;
+        Some(Self { reference, ..*self })
+    }
+
+    /// Likeliest box behind a face, on either side of it.
+    fn grown(&self, face: &BoxShape, judge: &Judge) -> Option<(f64, BoxShape)> {
+        let rough = judge.with_sigma(judge.workspace.errors.sigma_m(ROUGH_SIGMA_M));
+        let plan = Self { reference: self.reference.rescored(&rough), ..*self };
+        let count = ((SIDE_M[1] - SIDE_M[0]) / STEP_M) as i32;
+        let depth = |at: i32| {
+            let depth_m = SIDE_M[0] + STEP_M * f64::from(at.abs() - 1);
+            BoxShape { depth_m: depth_m.copysign(f64::from(at)), ..face.clone() }
+        };
+        let depths = (-count..=count).filter(|at| *at != 0).map(depth);
+        let mut starts = ranked(depths.collect(), |shape| plan.score_of(shape, &rough));
+        starts.truncate(STARTS);
+        let searched = starts.into_iter().filter_map(|(score, shape)| {
+            let ends = plan.near(&shape, &rough)?.ends_of(shape, &rough, score);
+            plan.fine(ends, judge)
+        });
+        searched.max_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// Box with the likeliest ends of its face, one after the other, twice.
+    fn ends_of(&self, from: BoxShape, rough: &Judge, score: f64) -> BoxShape {
+        let (mut best, mut best_score) = (from, score);
+        let [inwards, outwards] = END_SPAN_M.map(|span_m| (span_m / STEP_M) as i32);
+        for _ in 0..2 {
+            for is_to in [true, false] {
+                let with = |at: i32| {
+                    let by_m = STEP_M * f64::from(at);
+                    let mut shape = best.clone();
+                    if is_to {
+                        shape.to_m += by_m;
+                    } else {
+                        shape.from_m -= by_m;
+                    }
+                    shape
+                };
+                let tried = (-inwards..=outwards).map(with).collect();
+                let tried = ranked(tried, |shape| self.score_of(shape, rough));
+                let better = tried.into_iter().next().filter(|of| of.0 > best_score);
+                if let Some((score, shape)) = better {
+                    (best, best_score) = (shape, score);
                 }
-                shape
-            };
-            let tried = ranked((-inwards..=outwards).map(with).collect(), |shape| {
-                score_of(shape, walls, rough)
-            });
-            if let Some((score, shape)) = tried.into_iter().next().filter(|of| of.0 > best_score) {
-                (best, best_score) = (shape, score);
             }
         }
+        best
     }
-    best
-}
 
-/// Box with all three sizes improved by steps that become smaller.
-fn fine(from: BoxShape, walls: &[Segment], judge: &Judge) -> (f64, BoxShape) {
-    const MAX_STEPS: usize = 6;
-    let mut best = (f64::NEG_INFINITY, from);
-    for step_m in FINE_M {
-        let own = judge.with_sigma(judge.sigma_m.max(0.5 * step_m));
-        let neighbours = |shape: &BoxShape| {
-            let moved = (0..6).map(|at| {
-                let by_m = if at % 2 == 0 { step_m } else { -step_m };
-                let mut shape = shape.clone();
-                match at / 2 {
-                    0 => shape.from_m += by_m,
-                    1 => shape.to_m += by_m,
-                    _ => shape.depth_m += by_m,
-                }
-                shape
-            });
-            moved.collect()
-        };
-        best = climbed(best.1, MAX_STEPS, neighbours, |shape| score_of(shape, walls, &own));
+    /// Box with all three sizes improved by steps that become smaller; `None` if the scene has more
+    /// paths than the model follows.
+    fn fine(&self, from: BoxShape, judge: &Judge) -> Option<(f64, BoxShape)> {
+        const MAX_STEPS: usize = 6;
+        let mut best = (f64::NEG_INFINITY, from);
+        for step_m in FINE_M {
+            let own = judge.with_sigma(judge.sigma_m.max(0.5 * step_m));
+            let plan = self.near(&best.1, &own)?;
+            let neighbours = |shape: &BoxShape| {
+                let moved = (0..6).map(|at| {
+                    let by_m = if at % 2 == 0 { step_m } else { -step_m };
+                    let mut shape = shape.clone();
+                    match at / 2 {
+                        0 => shape.from_m += by_m,
+                        1 => shape.to_m += by_m,
+                        _ => shape.depth_m += by_m,
+                    }
+                    shape
+                });
+                moved.collect()
+            };
+            best = climbed(best.1, MAX_STEPS, neighbours, |shape| plan.score_of(shape, &own));
+        }
+        Some(best)
     }
-    best
-}
 
-fn score_of(shape: &BoxShape, walls: &[Segment], judge: &Judge) -> Option<f64> {
-    let sides = [shape.to_m - shape.from_m, shape.depth_m.abs()];
-    let is_sized = sides.iter().all(|side_m| (SIDE_M[0]..SIDE_M[1]).contains(side_m));
-    let corners = shape.corners();
-    let is_clear = judge.poses.iter().all(|pose| !encloses(&corners, pose.position()));
-    (is_sized && is_clear).then(|| judge.score_segments(&shape.placed(walls)))
+    /// Score with a box, nats; `None` for one that is too large or too small or contains a stop.
+    fn score_of(&self, shape: &BoxShape, judge: &Judge) -> Option<f64> {
+        let sides = [shape.to_m - shape.from_m, shape.depth_m.abs()];
+        let is_sized = sides.iter().all(|side_m| (SIDE_M[0]..SIDE_M[1]).contains(side_m));
+        let corners = shape.corners();
+        let is_clear = judge.poses.iter().all(|pose| !encloses(&corners, pose.position()));
+        (is_sized && is_clear).then(|| {
+            let context = ScoreContext::default().near(Some(&self.reference));
+            let score = judge.score_segments_above(&shape.placed(self.walls), context);
+            score.unwrap_or(UNSCORED)
+        })
+    }
 }
 
 impl BoxShape {

@@ -1,6 +1,9 @@
 //! Score of a plan: likelihood of all readings by the exact model, less the price of its walls and
 //! posts.
 
+mod reference;
+mod sweep_rays;
+
 use std::{
     collections::HashMap,
     f64::consts::TAU,
@@ -14,6 +17,9 @@ use sonard_model::{
     reading::PingStatus,
     scene::{Cylinder, Material, Scene, Wall},
 };
+
+pub(crate) use reference::ReferencePlan;
+use sweep_rays::{DIRECTION_STEP_DEG, KnownRays, Ray, SweepPredictor};
 
 use crate::{
     arrangement::{LineArrangement, PieceSet, Segment, free_ends},
@@ -37,14 +43,13 @@ const LENGTH_NATS_PER_M: f64 = 0.5;
 /// Price of a post, nats: that of a wall and, for each of its three numbers, half that of a line,
 /// which has two. A single arc that it explains gains about as much.
 const POST_NATS: f64 = 10.0;
-/// Step of directions in which readings are predicted for all headings, degrees: at most half of
-/// the step of a coarse ranger's beams.
-const DIRECTION_STEP_DEG: f64 = 1.5;
 /// Maximum turn to the likeliest heading, standard deviations of odometry and degrees.
 const MAX_TURN_SIGMAS: f64 = 2.5;
 const MAX_TURN_DEG: f64 = 20.0;
 /// Score of a plan with more paths than the model follows.
-const UNSCORED: f64 = -1e9;
+pub(crate) const UNSCORED: f64 = -1e9;
+/// Rounding of sums in different orders, nats.
+pub(crate) const ROUNDING: f64 = 1e-6;
 
 /// Predicted readings of all sweeps.
 pub(crate) type Predictions = Vec<Vec<Prediction>>;
@@ -57,11 +62,38 @@ pub(crate) struct Judge<'a> {
     pub(crate) posts: Vec<PostShape>,
     /// Standard deviation of ranges, metres.
     pub(crate) sigma_m: f64,
-    /// Maximum log-likelihood of the readings of each sweep, nats.
-    max_nats: Vec<f64>,
+    /// Maximum log-likelihood of each reading of each sweep, nats.
+    max_nats: Vec<Vec<f64>>,
     /// Headings are chosen for each plan.
     are_headings_free: bool,
     known: Mutex<HashMap<PieceSet, KnownScore>>,
+}
+
+/// Purpose of a score: plans below a floor are of no interest, and those that differ little from a
+/// reference are predicted by it.
+#[derive(Clone, Copy)]
+pub(crate) struct ScoreContext<'r> {
+    /// Floor, nats.
+    pub(crate) floor: f64,
+    pub(crate) reference: Option<&'r ReferencePlan>,
+}
+
+impl Default for ScoreContext<'_> {
+    fn default() -> Self {
+        Self::above(f64::NEG_INFINITY)
+    }
+}
+
+impl<'r> ScoreContext<'r> {
+    /// Scores above a floor, nats, by new predictions.
+    pub(crate) const fn above(floor: f64) -> Self {
+        Self { floor, reference: None }
+    }
+
+    /// Scores by the predictions of a reference, if there is one.
+    pub(crate) fn near(self, reference: Option<&'r ReferencePlan>) -> Self {
+        Self { reference, ..self }
+    }
 }
 
 /// Score of walls, nats, or a bound that excluded them.
@@ -75,10 +107,9 @@ impl<'a> Judge<'a> {
     /// Judge of the plans of one arrangement, from given poses and with a standard deviation of
     /// ranges in metres.
     pub(crate) fn new(workspace: &'a Workspace<'a>, poses: &[Pose], sigma_m: f64) -> Self {
-        let of_sweep = |readings: &Readings| {
-            let measured = readings.beams.iter().map(|beam| beam.outcome);
-            sweep_nats(readings, measured, sigma_m, workspace.reach_m())
-        };
+        let reach_m = workspace.reach_m();
+        let max = |beam: &Beam| outcome_nats([beam.outcome; 2], sigma_m, reach_m);
+        let of_sweep = |readings: &Readings| readings.beams.iter().map(max).collect();
         let max_nats = workspace.readings.iter().map(of_sweep).collect();
         let (poses, posts, known) = (poses.to_vec(), Vec::new(), Mutex::default());
         Self { workspace, poses, posts, sigma_m, max_nats, are_headings_free: false, known }
@@ -119,7 +150,8 @@ impl<'a> Judge<'a> {
         }
         let simulator = self.simulator_of(segments)?;
         let turned = |(sweep, pose): (usize, &Pose)| {
-            let (_, by_deg) = self.likeliest_turn(&simulator, sweep, pose)?;
+            let rays = SweepPredictor::new(self, &simulator, sweep, pose).rays()?;
+            let (_, by_deg) = self.likeliest_turn(sweep, &rays);
             Some(Pose { heading_deg: wrap_180(pose.heading_deg + by_deg), ..*pose })
         };
         self.poses.iter().enumerate().map(turned).collect()
@@ -132,24 +164,24 @@ impl<'a> Judge<'a> {
 
     /// Scores the walls of an arrangement, nats.
     pub(crate) fn score(&self, plan: &LineArrangement, walls: &PieceSet) -> f64 {
-        self.score_above(plan, walls, f64::NEG_INFINITY).unwrap_or(UNSCORED)
+        self.score_above(plan, walls, ScoreContext::default()).unwrap_or(UNSCORED)
     }
 
-    /// Scores the walls of an arrangement, nats; `None` as soon as the readings of some sweeps
-    /// exclude a score above `floor`.
+    /// Scores the walls of an arrangement, nats; `None` as soon as some readings exclude a score above
+    /// the floor.
     pub(crate) fn score_above(
         &self,
         plan: &LineArrangement,
         walls: &PieceSet,
-        floor: f64,
+        context: ScoreContext,
     ) -> Option<f64> {
         let known = self.lock().get(walls).copied();
         match known {
             Some(KnownScore::Exact(score)) => return Some(score),
-            Some(KnownScore::AtMost(bound)) if bound <= floor => return None,
+            Some(KnownScore::AtMost(bound)) if bound <= context.floor => return None,
             _ => {}
         }
-        let score = self.score_segments_above(&plan.segments(walls), floor);
+        let score = self.score_segments_above(&plan.segments(walls), context);
         let known = score.map_or_else(KnownScore::AtMost, KnownScore::Exact);
         self.lock().insert(walls.clone(), known);
         score.ok()
@@ -161,20 +193,20 @@ impl<'a> Judge<'a> {
 
     /// Scores walls, nats.
     pub(crate) fn score_segments(&self, segments: &[Segment]) -> f64 {
-        self.score_segments_above(segments, f64::NEG_INFINITY).unwrap_or(UNSCORED)
+        self.score_segments_above(segments, ScoreContext::default()).unwrap_or(UNSCORED)
     }
 
-    /// Score, or an upper bound of it that does not exceed `floor`, nats.
+    /// Score, or an upper bound of it that does not exceed the floor, nats.
     pub(crate) fn score_segments_above(
         &self,
         segments: &[Segment],
-        floor: f64,
+        context: ScoreContext,
     ) -> Result<f64, f64> {
         let price = price(segments) + POST_NATS * self.posts.len() as f64;
         let oblique = self.oblique_nats(segments);
         let priced = |nats: f64| nats - price - oblique;
-        let nats = self.log_likelihood_above(segments, floor + price + oblique);
-        nats.map(priced).map_err(priced)
+        let context = ScoreContext { floor: context.floor + price + oblique, ..context };
+        self.log_likelihood_above(segments, context).map(priced).map_err(priced)
     }
 
     /// Price of directions off right angles, nats; 0 without that assumption.
@@ -184,39 +216,106 @@ impl<'a> Judge<'a> {
 
     /// Log-likelihood of all readings, with the readings of an arc as one, nats.
     pub(crate) fn log_likelihood(&self, segments: &[Segment]) -> f64 {
-        self.log_likelihood_above(segments, f64::NEG_INFINITY).unwrap_or(UNSCORED)
+        self.log_likelihood_above(segments, ScoreContext::default()).unwrap_or(UNSCORED)
     }
 
     /// Log-likelihood of all readings, with the readings of an arc as one, nats; an upper bound as
-    /// soon as some sweeps give one below `floor`.
+    /// soon as some readings give one below the floor.
     pub(crate) fn log_likelihood_above(
         &self,
         segments: &[Segment],
-        floor: f64,
+        context: ScoreContext,
     ) -> Result<f64, f64> {
-        /// Rounding of sums in different orders, nats.
-        const ROUNDING: f64 = 1e-6;
         let digest = self.digest(segments);
         self.workspace.count_scene(digest);
-        let sum = || {
-            let Some(simulator) = self.simulator_of(segments) else { return Ok(UNSCORED) };
-            let mut sum = 0.0;
-            let mut max_of_rest: f64 = self.max_nats.iter().sum();
-            for (sweep, pose) in self.poses.iter().enumerate() {
-                let nats = match self.are_headings_free {
-                    true => self.likeliest_turn(&simulator, sweep, pose).map(|of| of.0),
-                    false => self.log_likelihood_of(&simulator, sweep, pose),
-                };
-                let Some(nats) = nats else { return Ok(UNSCORED) };
-                sum += nats;
-                max_of_rest -= self.max_nats[sweep];
-                if sum + max_of_rest < floor - ROUNDING {
-                    return Err(sum + max_of_rest);
-                }
-            }
-            Ok(sum)
+        self.workspace.scores.get_or(digest, || self.predicted_nats(segments, context))
+    }
+
+    fn predicted_nats(
+        &self,
+        segments: &[Segment],
+        ScoreContext { floor, reference }: ScoreContext,
+    ) -> Result<f64, f64> {
+        let change = reference.map(|of| (of, of.change_to(segments, &self.posts)));
+        let known = |sweep: usize| {
+            let (reference, change) = change.as_ref()?;
+            Some(reference.known(change, sweep, self.poses[sweep].position()))
         };
-        self.workspace.scores.get_or(digest, sum)
+        let mut sweeps: Vec<SweepBound> =
+            (0..self.poses.len()).map(|sweep| self.bound(sweep, known(sweep))).collect();
+        let mut nats: Vec<f64> = sweeps.iter().map(|of| of.max).collect();
+        let mut bound: f64 = nats.iter().sum();
+        let is_excluded = |bound: f64| bound < floor - ROUNDING;
+        if is_excluded(bound) {
+            return Err(bound);
+        }
+        sweeps.retain(|of| of.is_affected);
+        if sweeps.is_empty() {
+            return Ok(nats.iter().sum());
+        }
+        let Some(simulator) = self.simulator_of(segments) else { return Ok(UNSCORED) };
+        // What may gain most bounds most.
+        sweeps.sort_by(|a, b| b.may_gain.total_cmp(&a.may_gain).then(a.sweep.cmp(&b.sweep)));
+        for SweepBound { sweep, known, max, .. } in sweeps {
+            let predictor = SweepPredictor::new(self, &simulator, sweep, &self.poses[sweep]);
+            let rays = match known {
+                Some(known) => {
+                    let Some(affected) = predictor.affected(&known) else { return Ok(UNSCORED) };
+                    let bounded = self.bound_of(sweep, &known, &affected);
+                    if is_excluded(bound + bounded.max - max) {
+                        return Err(bound + bounded.max - max);
+                    }
+                    predictor.changed(&known, &affected)
+                }
+                None => predictor.rays(),
+            };
+            let Some(rays) = rays else { return Ok(UNSCORED) };
+            nats[sweep] = self.sweep_nats(sweep, &rays);
+            bound += nats[sweep] - max;
+            if is_excluded(bound) {
+                return Err(bound);
+            }
+        }
+        Ok(nats.iter().sum())
+    }
+
+    /// Bound of the log-likelihood of a sweep's readings before any prediction.
+    fn bound<'r>(&self, sweep: usize, known: Option<KnownRays<'r>>) -> SweepBound<'r> {
+        match known {
+            Some(known) => self.bound_of(sweep, &known, &known.affected()),
+            None => SweepBound {
+                sweep,
+                known,
+                max: self.max_of(sweep),
+                may_gain: 0.0,
+                is_affected: true,
+            },
+        }
+    }
+
+    /// Bound of the log-likelihood of a sweep's readings where some rays differ from known ones.
+    fn bound_of<'r>(
+        &self,
+        sweep: usize,
+        known: &KnownRays<'r>,
+        affected: &[usize],
+    ) -> SweepBound<'r> {
+        let rays = &known.of.rays;
+        let is_affected = !affected.is_empty();
+        let (own, known) = (self.sweep_nats(sweep, rays), Some(*known));
+        if is_affected && self.is_turned(sweep) {
+            let max = self.max_of(sweep);
+            return SweepBound { sweep, known, max, may_gain: max - own, is_affected };
+        }
+        let gain = |at: &usize| self.max_nats[sweep][*at] - rays[*at].nats;
+        let may_gain =
+            affected.iter().map(gain).sum::<f64>() / self.readings()[sweep].beams_per_arc;
+        SweepBound { sweep, known, max: own + may_gain, may_gain, is_affected }
+    }
+
+    /// Maximum log-likelihood of a sweep's readings, nats.
+    fn max_of(&self, sweep: usize) -> f64 {
+        self.max_nats[sweep].iter().sum::<f64>() / self.readings()[sweep].beams_per_arc
     }
 
     /// Digest of walls, posts, poses, standard deviation of ranges, freedom of headings, and model.
@@ -238,23 +337,38 @@ impl<'a> Judge<'a> {
         hasher.finish()
     }
 
+    /// Returns `true` if the heading of a sweep is chosen for each plan: that of the first is the
+    /// frame.
+    pub(crate) fn is_turned(&self, sweep: usize) -> bool {
+        let is_free = |sigma_deg: f64| sigma_deg > 0.0;
+        self.are_headings_free && self.workspace.heading_sigma_deg(sweep).is_some_and(is_free)
+    }
+
+    /// Log-likelihood of the reading of a beam under a predicted outcome, nats.
+    pub(crate) fn beam_nats(&self, beam: &Beam, predicted: Outcome) -> f64 {
+        outcome_nats([beam.outcome, predicted], self.sigma_m, self.workspace.reach_m())
+    }
+
+    /// Log-likelihood of the readings of a sweep by its predicted outcomes, nats; with that of its
+    /// odometry where its heading is free.
+    fn sweep_nats(&self, sweep: usize, rays: &[Ray]) -> f64 {
+        if self.is_turned(sweep) {
+            return self.likeliest_turn(sweep, rays).0;
+        }
+        let sum: f64 = rays.iter().map(|ray| ray.nats).sum();
+        sum / self.readings()[sweep].beams_per_arc
+    }
+
     /// Log-likelihood of the readings of a sweep and of its odometry at the likeliest heading, nats,
-    /// and the turn to that heading, degrees; 0 for the first sweep, which is the frame.
+    /// and the turn to that heading, degrees; 0 for a heading that is not free.
     ///
-    /// Readings are predicted once in all directions, in steps of 1.5 degrees; a heading selects
-    /// among them.
-    fn likeliest_turn(
-        &self,
-        simulator: &Simulator,
-        sweep: usize,
-        pose: &Pose,
-    ) -> Option<(f64, f64)> {
-        let sigma_deg = self.workspace.heading_sigma_deg(sweep).filter(|sigma| *sigma > 0.0);
-        let Some(sigma_deg) = sigma_deg else {
-            return Some((self.log_likelihood_of(simulator, sweep, pose)?, 0.0));
+    /// A heading selects among the outcomes predicted in all directions.
+    fn likeliest_turn(&self, sweep: usize, rays: &[Ray]) -> (f64, f64) {
+        let sigma_deg = self.workspace.heading_sigma_deg(sweep);
+        let Some(sigma_deg) = sigma_deg.filter(|_| self.is_turned(sweep)) else {
+            return (self.sweep_nats(sweep, rays), 0.0);
         };
-        let predicted = predict_around(simulator, pose)?;
-        let own = &self.readings()[sweep];
+        let (own, pose) = (&self.readings()[sweep], &self.poses[sweep]);
         let odometry_deg = own.odometry.heading_deg - self.readings()[0].odometry.heading_deg;
         let off_deg = wrap_180(pose.heading_deg - self.poses[0].heading_deg - odometry_deg);
         let max_deg = (MAX_TURN_SIGMAS * sigma_deg).min(MAX_TURN_DEG);
@@ -264,13 +378,13 @@ impl<'a> Judge<'a> {
             let outcomes = own.beams.iter().map(|beam| {
                 let direction_deg = wrap_360(pose.heading_deg + by_deg + beam.azimuth_deg);
                 let nearest = (direction_deg / DIRECTION_STEP_DEG).round() as usize;
-                predicted[nearest % predicted.len()]
+                rays[nearest % rays.len()].outcome
             });
             let nats = sweep_nats(own, outcomes, self.sigma_m, self.workspace.reach_m());
             let off = (off_deg + by_deg) / sigma_deg;
             (nats - 0.5 * off * off, by_deg)
         });
-        scored.max_by(|a, b| a.0.total_cmp(&b.0))
+        scored.max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((UNSCORED, 0.0))
     }
 
     /// Log-likelihood of the readings of one sweep from a pose, nats; `None` if the scene has more
@@ -313,26 +427,20 @@ impl<'a> Judge<'a> {
         sweep: usize,
         pose: &Pose,
     ) -> Option<Vec<Prediction>> {
-        let readings = &self.readings()[sweep];
-        let point = simulator.at(pose.position());
-        let of_beam = |beam: &Beam| {
-            let direction_rad = pose.direction_rad(beam.azimuth_deg);
-            if beam.face == DVec2::ZERO {
-                return point.ping(direction_rad).ok();
-            }
-            let face = pose.rotate_to_world(beam.face);
-            let prediction = match self.workspace.is_simplified {
-                true => point.ping_beside(direction_rad, face),
-                false => simulator.at(pose.position() + face).ping(direction_rad),
-            };
-            let mut prediction = prediction.ok()?;
-            if prediction.range_m.is_some_and(|range_m| range_m > readings.max_range_m) {
-                (prediction.status, prediction.range_m) = (PingStatus::NoEcho, None);
-            }
-            Some(prediction)
-        };
-        readings.beams.iter().map(of_beam).collect()
+        SweepPredictor::new(self, simulator, sweep, pose).predictions()
     }
+}
+
+/// Bound of the log-likelihood of a sweep's readings.
+struct SweepBound<'r> {
+    sweep: usize,
+    known: Option<KnownRays<'r>>,
+    /// Bound, nats; exact if the sweep is not affected.
+    max: f64,
+    /// Maximum gain over the known outcomes, nats.
+    may_gain: f64,
+    /// Some outcomes are unknown.
+    is_affected: bool,
 }
 
 /// Scene with walls and posts of the first material of a template; both keep their index.
@@ -362,15 +470,6 @@ fn scene_of(template: &Scene, segments: &[Segment], posts: &[PostShape]) -> Scen
 /// its range by the place.
 pub(crate) fn mean_direction(arrival: &Arrival) -> DVec2 {
     0.5 * (DVec2::from_angle(arrival.departure_rad) + DVec2::from_angle(arrival.arrival_rad))
-}
-
-/// Predicted outcomes in all directions from a place, in steps of [`DIRECTION_STEP_DEG`].
-fn predict_around(simulator: &Simulator, pose: &Pose) -> Option<Vec<Outcome>> {
-    let point = simulator.at(pose.position());
-    let count = (360.0 / DIRECTION_STEP_DEG) as usize;
-    let direction_rad = |at: usize| (DIRECTION_STEP_DEG * at as f64).to_radians();
-    let ping = |at: usize| point.ping(direction_rad(at)).ok().map(|of| outcome_of(&of));
-    (0..count).map(ping).collect()
 }
 
 /// Predicted outcome of a beam.

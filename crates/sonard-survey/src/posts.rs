@@ -5,7 +5,7 @@ use sonard_model::geometry::{Pose, wrap_pi};
 use crate::{
     arc::Arc,
     arrangement::Segment,
-    judge::Judge,
+    judge::{Judge, ReferencePlan, ScoreContext, UNSCORED},
     normal::NormalEquations,
     posed::PosedPlan,
     post::{CLEAR_M, PostShape},
@@ -96,10 +96,14 @@ pub(crate) fn with_new_posts<'a>(
 
 /// Post of several that adds most to the likelihood of a plan, if it pays.
 fn best_post(posed: &PosedPlan, judge: &Judge, posts: Vec<PostShape>) -> Option<PostShape> {
-    let before = judge.score_segments(&posed.plan.segments(&posed.walls));
+    let walls = posed.plan.segments(&posed.walls);
+    let before = judge.score_segments(&walls);
+    let reference = ReferencePlan::new(judge, &walls)?;
     let rough = judge.with_sigma(judge.workspace.errors.sigma_m(ROUGH_SIGMA_M));
-    let best = ranked(posts, |post| score_of(post, posed, &rough)).into_iter().take(MAX_REFINED);
-    let found = best.map(|(_, post)| fine(post, posed, judge));
+    let near = reference.rescored(&rough);
+    let best = ranked(posts, |post| score_of(post, posed, (&rough, &near)));
+    let best = best.into_iter().take(MAX_REFINED);
+    let found = best.filter_map(|(_, post)| fine(post, posed, (judge, &reference)));
     let (score, post) = found.max_by(|a, b| a.0.total_cmp(&b.0))?;
     (score > before + MIN_GAIN).then_some(post)
 }
@@ -206,12 +210,23 @@ fn fitted(seed: PostShape, left: &[&Arc], poses: &[Pose]) -> Option<FittedPost> 
     is_agreed.then_some(FittedPost { post, sigma_radius_m, beams })
 }
 
-/// Post improved by steps that become smaller, with the score of the plan.
-fn fine(from: PostShape, posed: &PosedPlan, judge: &Judge) -> (f64, PostShape) {
+/// Post improved by steps that become smaller, with the score of the plan; `None` if the scene has
+/// more paths than the model follows.
+fn fine(
+    from: PostShape,
+    posed: &PosedPlan,
+    (judge, reference): (&Judge, &ReferencePlan),
+) -> Option<(f64, PostShape)> {
     const MAX_STEPS: usize = 3;
+    let walls = posed.plan.segments(&posed.walls);
+    let near = |post: &PostShape, own: &Judge| {
+        let with = own.with_posts(&with_post(posed, post));
+        reference.rescored(own).followed_by(&with, &walls)
+    };
     let mut best = from;
     for step_m in FINE_M {
         let own = judge.with_sigma(judge.sigma_m.max(0.5 * step_m));
+        let near = near(&best, &own)?;
         let neighbours = |post: &PostShape| {
             let moved = (0..6).map(|at| {
                 let mut by = [0.0; 3];
@@ -220,16 +235,31 @@ fn fine(from: PostShape, posed: &PosedPlan, judge: &Judge) -> (f64, PostShape) {
             });
             moved.collect()
         };
-        (_, best) = climbed(best, MAX_STEPS, neighbours, |post| score_of(post, posed, &own));
+        let score = |post: &PostShape| score_of(post, posed, (&own, &near));
+        (_, best) = climbed(best, MAX_STEPS, neighbours, score);
     }
-    (score_of(&best, posed, judge).unwrap_or(f64::NEG_INFINITY), best)
+    let score = score_of(&best, posed, (judge, &near(&best, judge)?));
+    Some((score.unwrap_or(f64::NEG_INFINITY), best))
 }
 
-/// Score of a plan with one more post; `None` where none can be.
-fn score_of(post: &PostShape, posed: &PosedPlan, judge: &Judge) -> Option<f64> {
+/// Score of a plan with one more post, by the predictions of one that differs little; `None` where no
+/// post can be.
+fn score_of(
+    post: &PostShape,
+    posed: &PosedPlan,
+    (judge, reference): (&Judge, &ReferencePlan),
+) -> Option<f64> {
     let walls = posed.plan.segments(&posed.walls);
-    let with = || [&posed.posts[..], &[*post]].concat();
-    is_clear(post, &walls, posed).then(|| judge.with_posts(&with()).score_segments(&walls))
+    is_clear(post, &walls, posed).then(|| {
+        let with = judge.with_posts(&with_post(posed, post));
+        let context = ScoreContext::default().near(Some(reference));
+        with.score_segments_above(&walls, context).unwrap_or(UNSCORED)
+    })
+}
+
+/// Posts of a plan with one more.
+fn with_post(posed: &PosedPlan, post: &PostShape) -> Vec<PostShape> {
+    [&posed.posts[..], &[*post]].concat()
 }
 
 /// Returns `true` if range and middle of an arc agree with an echo from the surface.

@@ -1,11 +1,13 @@
 //! Search of the walls of an arrangement: moves as long as they gain.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 use sonard_model::geometry::Pose;
 
 use crate::{
     arrangement::{LineArrangement, PieceSet, Run},
-    judge::Judge,
+    judge::{Judge, ROUNDING, ReferencePlan, ScoreContext, UNSCORED},
     line::Foot,
     moves::{MoveFinder, PlanMove, crosses},
     trace::touched_pieces,
@@ -25,6 +27,58 @@ const PRUNING_LOSS: f64 = 12.0;
 pub(crate) struct ScoredPlan {
     pub(crate) walls: PieceSet,
     pub(crate) score: f64,
+    /// Predictions; `None` if the scene has more paths than the model follows.
+    reference: Option<Arc<ReferencePlan>>,
+}
+
+impl ScoredPlan {
+    /// Scores walls of an arrangement.
+    pub(crate) fn new(plan: &LineArrangement, judge: &Judge, walls: PieceSet) -> Self {
+        let reference = ReferencePlan::new(judge, &plan.segments(&walls)).map(Arc::new);
+        Self::with_reference(plan, judge, walls, reference)
+    }
+
+    /// Scores other walls by the predictions of this plan.
+    pub(crate) fn with_walls(
+        &self,
+        plan: &LineArrangement,
+        judge: &Judge,
+        walls: PieceSet,
+    ) -> Self {
+        let segments = plan.segments(&walls);
+        let reference = match self.reference() {
+            Some(known) => known.followed_by(judge, &segments),
+            None => ReferencePlan::new(judge, &segments),
+        };
+        Self::with_reference(plan, judge, walls, reference.map(Arc::new))
+    }
+
+    fn with_reference(
+        plan: &LineArrangement,
+        judge: &Judge,
+        walls: PieceSet,
+        reference: Option<Arc<ReferencePlan>>,
+    ) -> Self {
+        let context = ScoreContext::default().near(reference.as_deref());
+        let score = judge.score_above(plan, &walls, context).unwrap_or(UNSCORED);
+        Self { walls, score, reference }
+    }
+
+    /// Predictions of the plan, by which others are scored that differ little.
+    pub(crate) fn reference(&self) -> Option<&ReferencePlan> {
+        self.reference.as_deref()
+    }
+
+    /// Score of other walls, nats; `None` unless it is above a floor.
+    pub(crate) fn score_of(
+        &self,
+        plan: &LineArrangement,
+        judge: &Judge,
+        walls: &PieceSet,
+        floor: f64,
+    ) -> Option<f64> {
+        judge.score_above(plan, walls, ScoreContext::above(floor).near(self.reference()))
+    }
 }
 
 /// Search over the pieces of an arrangement.
@@ -37,9 +91,9 @@ pub(crate) struct PlanSearch<'a> {
 
 impl PlanSearch<'_> {
     /// Improves walls until no move gains.
-    pub(crate) fn climb(&self, walls: PieceSet) -> ScoredPlan {
+    pub(crate) fn climb(&self, from: ScoredPlan) -> ScoredPlan {
         let finder = MoveFinder::new(self.plan, &self.judge.poses);
-        let mut best = self.scored(walls);
+        let mut best = from;
         for round in 1.. {
             if self.is_over() {
                 break;
@@ -56,7 +110,8 @@ impl PlanSearch<'_> {
                 break;
             }
             if round <= PRUNED_ROUNDS {
-                let pruned = self.scored(self.without_unmet(&best.walls));
+                let pruned = self.without_unmet(&best.walls);
+                let pruned = best.with_walls(self.plan, self.judge, pruned);
                 if pruned.score > best.score - PRUNING_LOSS {
                     best = pruned;
                 }
@@ -92,11 +147,6 @@ impl PlanSearch<'_> {
         best
     }
 
-    fn scored(&self, walls: PieceSet) -> ScoredPlan {
-        let score = self.judge.score(self.plan, &walls);
-        ScoredPlan { walls, score }
-    }
-
     fn is_over(&self) -> bool {
         self.judge.workspace.is_over()
     }
@@ -113,12 +163,16 @@ impl PlanSearch<'_> {
             .filter(allowed)
             .filter_map(|change| {
                 let walls = from.walls.changed(&change);
-                let score = self.judge.score_above(self.plan, &walls, from.score + MIN_GAIN)?;
+                let floor = from.score + MIN_GAIN;
+                let score = from.score_of(self.plan, self.judge, &walls, floor)?;
                 Some((score - from.score, change))
             })
             .collect();
         scored.retain(|(gain, _)| *gain > MIN_GAIN);
-        scored.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.cmp(&b.1)));
+        // Equal gains of different changes differ by rounding.
+        let rounded = |gain: f64| (gain / ROUNDING).round();
+        let order = |a: f64, b: f64| rounded(b).total_cmp(&rounded(a));
+        scored.sort_by(|a, b| order(a.0, b.0).then_with(|| a.1.cmp(&b.1)));
         scored.into_iter().map(|(_, change)| change).collect()
     }
 
@@ -126,12 +180,12 @@ impl PlanSearch<'_> {
     fn try_move(&self, best: &mut ScoredPlan, change: &PlanMove, min_gain: f64) -> bool {
         let walls = best.walls.changed(change);
         let floor = best.score + min_gain;
-        let score = self.judge.score_above(self.plan, &walls, floor);
-        let better = score.filter(|score| *score > floor && walls != best.walls);
-        if let Some(score) = better {
-            *best = ScoredPlan { walls, score };
+        let score = best.score_of(self.plan, self.judge, &walls, floor);
+        let is_better = walls != best.walls && score.is_some_and(|score| score > floor);
+        if is_better {
+            *best = best.with_walls(self.plan, self.judge, walls);
         }
-        better.is_some()
+        is_better
     }
 
     /// Walls without the ends that no path of an explained arc meets.

@@ -6,6 +6,7 @@ mod coarse;
 mod next_view;
 mod posts;
 mod rectangle;
+mod reference;
 mod sensor_fit;
 mod stages;
 mod undetermined;

@@ -1,6 +1,6 @@
 //! Engines, which find the echoes that arrive at the transducer's face.
 
-use super::{cost::TooCostly, path::Path};
+use super::{cost::TooCostly, path::Path, paths::EchoSet};
 use crate::{
     acoustics::{Image, Incidence, Incident, PulseArrival},
     geometry::{DVec2, wrap_pi},
@@ -131,6 +131,12 @@ pub trait Arrivals: Send + Sync {
                 image,
             },
         }
+    }
+
+    /// Lists the echoes up to a length there and back, in metres, for comparison with those in
+    /// another scene; `None` from engines without such a list.
+    fn echo_set(&self, _length_m: f64) -> Option<EchoSet> {
+        None
     }
 
     /// Returns all arrivals of a firing in full, shortest path first.

@@ -14,6 +14,7 @@ use smallvec::SmallVec;
 use super::{
     cost::TooCostly,
     engine::{Arrival, Arrivals, Engine},
+    paths::EchoSet,
 };
 use crate::{
     acoustics::{Incident, PulseArrival},
@@ -153,6 +154,17 @@ impl<'a> LazyArrivals<'a> {
         let (result, needed_m) = predict(&whole);
         record(needed_m.unwrap_or(f64::INFINITY));
         Ok((result, whole))
+    }
+
+    /// Lists all echoes up to a length there and back, in metres; `None` from an engine without such
+    /// a list.
+    pub(super) fn echo_set(&self, length_m: f64) -> Result<Option<EchoSet>, TooCostly> {
+        let step = self.steps.partition_point(|step| step.reach_m < length_m);
+        let arrivals = match self.reaching(step)? {
+            Some(arrivals) => arrivals,
+            None => self.whole()?,
+        };
+        Ok(arrivals.echo_set(length_m))
     }
 
     /// Returns arrivals at least up to the reach of a step: the known ones, or those of a search up

@@ -9,6 +9,7 @@ use super::{
     crosstalk::{MergedArrivals, MixedArrivals, OtherFirings},
     engine::{Arrival, Arrivals},
     lazy::LazyArrivals,
+    paths::EchoSet,
     prediction::Prediction,
     simulator::Simulator,
 };
@@ -75,11 +76,52 @@ impl<'a> ObservationPoint<'a> {
     /// # Errors
     /// As [`Self::ping`].
     pub fn ping_beside(&self, direction_rad: f64, offset: DVec2) -> Result<Prediction, TooCostly> {
+        self.predict_beside(direction_rad, offset).map(|(prediction, _)| prediction)
+    }
+
+    /// Predicts the reading of a firing as [`ping_beside`](Self::ping_beside), exactly for an offset
+    /// of zero, and returns the radius around this point, metres, outside of which no change of the
+    /// scene affects it: any echo from there, or path blocked there, would be longer than those that
+    /// decide the reading. Infinite if all paths affect it.
+    ///
+    /// # Errors
+    /// As [`Self::ping`].
+    pub fn ping_with_radius(
+        &self,
+        direction_rad: f64,
+        offset: DVec2,
+    ) -> Result<(Prediction, f64), TooCostly> {
+        let receiver = self.simulator.receiver();
+        let (prediction, needed_m) = match offset == DVec2::ZERO {
+            true => self.predict_alone(receiver, direction_rad, Latch::First)?,
+            false => self.predict_beside(direction_rad, offset)?,
+        };
+        let mounting = &self.simulator.sensor().mounting;
+        let transducers = mounting.transducer_positions(self.position, direction_rad);
+        let offsets_m = transducers.map(|transducer| transducer.distance(self.position));
+        Ok((prediction, 0.5 * (needed_m + offsets_m[0] + offsets_m[1])))
+    }
+
+    /// Lists the echoes from places within a radius around this point, metres, for comparison with
+    /// those in another scene. `None` for a transducer off the axis, and from engines without such a
+    /// list.
+    ///
+    /// # Errors
+    /// As [`Self::ping`].
+    pub fn echo_set(&self, radius_m: f64) -> Result<Option<EchoSet>, TooCostly> {
+        self.axis.as_ref().map_or(Ok(None), |all| all.echo_set(2.0 * radius_m))
+    }
+
+    fn predict_beside(
+        &self,
+        direction_rad: f64,
+        offset: DVec2,
+    ) -> Result<(Prediction, f64), TooCostly> {
         let receiver = self.simulator.receiver();
         let max_shift_m = 2.0 * offset.length();
         let mut arrivals = Vec::with_capacity(USUAL_ARRIVALS);
         self.at(direction_rad, |all| {
-            let (prediction, _) = all.nearest(|near| {
+            let ((prediction, needed_m), _) = all.nearest(|near| {
                 near.collect_arrivals(direction_rad, &mut arrivals);
                 let firing = DirectedArrivals { from: near, direction_rad };
                 for arrival in &mut arrivals {
@@ -99,9 +141,11 @@ impl<'a> ObservationPoint<'a> {
                 let known_m = near.reach_m - max_shift_m;
                 let (detection, needed_m) =
                     receiver.detect_within(known_m, &arrivals, &incident, Latch::First, 0.0);
-                (firing.prediction(detection), needed_m.map(|length_m| length_m + max_shift_m))
+                let needed_m = needed_m.map(|length_m| length_m + max_shift_m);
+                let prediction = firing.prediction(detection);
+                ((prediction, needed_m.unwrap_or(f64::INFINITY)), needed_m)
             })?;
-            Ok(prediction)
+            Ok((prediction, needed_m))
         })
     }
 

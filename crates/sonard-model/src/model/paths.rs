@@ -102,6 +102,7 @@ mod cylinders;
 mod diffraction;
 mod direction_index;
 mod echo;
+mod echo_set;
 mod effort;
 mod engine;
 mod enumerate;
@@ -122,6 +123,7 @@ mod traced;
 mod transducer;
 
 pub(super) use crosstalk::{CrosstalkPaths, TransducerPose};
+pub use echo_set::{EchoChange, EchoSet};
 pub use engine::PathEngine;
 pub use interactions::EchoPath;
 pub(super) use mirror_paths::MirrorPath;

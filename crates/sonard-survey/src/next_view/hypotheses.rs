@@ -7,7 +7,7 @@ use super::gaps::closures;
 use crate::{
     alternatives::{Assessment, JudgedWall, LISTED_NATS, is_same},
     arrangement::Segment,
-    judge::Judge,
+    judge::{Judge, ReferencePlan, ScoreContext},
     posed::PosedPlan,
     post::PostShape,
     result::{OpenPart, PieceStatus, SurveyedPost, WallPiece},
@@ -39,13 +39,16 @@ pub(super) fn hypotheses(
     let segments = posed.plan.segments(&posed.walls);
     let plan = Hypothesis { part: None, segments, posts: posed.posts.clone(), nats: 0.0 };
     let score = judge.score(&posed.plan, &posed.walls);
+    let reference = ReferencePlan::new(judge, &plan.segments);
+    let above = |floor: f64| ScoreContext::above(floor).near(reference.as_ref());
     let with_score = |mut of: Hypothesis| {
-        of.nats = judge.score_segments_above(&of.segments, score - LISTED_NATS).ok()? - score;
+        of.nats =
+            judge.score_segments_above(&of.segments, above(score - LISTED_NATS)).ok()? - score;
         Some(of)
     };
     let stretches = without_stretches(&plan, assessment).into_par_iter().filter_map(with_score);
     let mut others: Vec<Hypothesis> = stretches.collect();
-    others.extend(with_closed_gaps(&plan, judge));
+    others.extend(with_closed_gaps(&plan, judge, reference.as_ref()));
     others.extend(without_posts(&plan, posts));
     others.extend(alternatives(&plan, assessment));
     others.retain(|of| of.nats > -LISTED_NATS);
@@ -90,13 +93,17 @@ fn without_stretches(plan: &Hypothesis, assessment: &Assessment) -> Vec<Hypothes
 ///
 /// The price of walls is a prior of walls that readings show. Where readings show nothing, a room
 /// may go on or end. A closure that explains more than the plan counts as much as the plan.
-fn with_closed_gaps(plan: &Hypothesis, judge: &Judge) -> Vec<Hypothesis> {
+fn with_closed_gaps(
+    plan: &Hypothesis,
+    judge: &Judge,
+    reference: Option<&ReferencePlan>,
+) -> Vec<Hypothesis> {
     let stops: Vec<DVec2> = judge.poses.iter().map(Pose::position).collect();
     let own_nats = judge.log_likelihood(&plan.segments);
     let closed = |added: Vec<Segment>| {
         let segments = [&plan.segments[..], &added].concat();
-        let floor = own_nats - LISTED_NATS;
-        let nats = judge.log_likelihood_above(&segments, floor).ok()? - own_nats;
+        let context = ScoreContext::above(own_nats - LISTED_NATS).near(reference);
+        let nats = judge.log_likelihood_above(&segments, context).ok()? - own_nats;
         let ends = |of: &Segment| [of.a, of.b].map(|end| end.to_array());
         let part = Some(OpenPart::Gap { walls: added.iter().map(ends).collect() });
         Some(Hypothesis { part, segments, nats: nats.min(0.0), ..plan.clone() })

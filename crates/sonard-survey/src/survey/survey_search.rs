@@ -22,7 +22,7 @@ use crate::{
     refine::refine,
     relocate::relocated,
     result::SearchEnd,
-    search::{PlanSearch, initial_walls},
+    search::{PlanSearch, ScoredPlan, initial_walls},
     sensor_fit::SensorFitter,
     slam::{
         VirtualMap, are_same_course, map_of_poses, orders, reassociated, virtual_map,
@@ -372,7 +372,7 @@ impl<'a> SurveySearch<'a> {
             false => judge,
         };
         let search = PlanSearch { plan: &plan, judge: &judge, excluded: None };
-        let found = search.trim(search.climb(walls));
+        let found = search.trim(search.climb(ScoredPlan::new(&plan, &judge, walls)));
         (self.posed.plan, self.posed.walls) = (plan, found.walls);
         let poses = judge.poses_of(&self.posed.plan.segments(&self.posed.walls));
         self.posed.poses = poses.unwrap_or(judge.poses);

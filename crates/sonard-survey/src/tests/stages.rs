@@ -7,14 +7,14 @@ use crate::{
     arc::find_arcs,
     course::map_course,
     faces::cells,
-    judge::Judge,
+    judge::{Judge, ScoreContext},
     moves::MoveFinder,
     odometry::Move,
     polish::polish,
     posed::PosedPlan,
     post::PostShape,
     progress::NoObserver,
-    search::{PlanSearch, initial_walls},
+    search::{PlanSearch, ScoredPlan, initial_walls},
     slam::virtual_map_in_order,
 };
 
@@ -227,10 +227,11 @@ fn floors_exclude_only_lower_scores() {
     for change in moves {
         let changed = walls.changed(&change);
         let score = exact.score(&plan, &changed);
-        let above = judge.score_above(&plan, &changed, truth);
+        let above = judge.score_above(&plan, &changed, ScoreContext::above(truth));
         assert!(above.is_none_or(|above| above == score), "{above:?} against {score}");
         excluded += usize::from(above.is_none());
-        assert_eq!(judge.score_above(&plan, &changed, score - 1.0), Some(score), "{change:?}");
+        let below = ScoreContext::above(score - 1.0);
+        assert_eq!(judge.score_above(&plan, &changed, below), Some(score), "{change:?}");
     }
     assert!(excluded > 0);
 }
@@ -252,7 +253,7 @@ fn climbing_closes_the_room() {
     }
     let begun = initial_walls(&plan, &poses);
     let search = PlanSearch { plan: &plan, judge: &judge, excluded: None };
-    let found = search.trim(search.climb(begun));
+    let found = search.trim(search.climb(ScoredPlan::new(&plan, &judge, begun)));
     let segments = plan.segments(&found.walls);
     for [a, b] in sides(&corners) {
         let middle = a.midpoint(b);

@@ -4,6 +4,7 @@ use std::{f64::consts::PI, sync::Arc};
 
 use super::{
     direction_index::{DirectionEntry, DirectionIndex},
+    echo_set::EchoSet,
     floor::TracingPlan,
     found::{EchoPulse, FoundEchoes},
     pattern::{BoundedPattern, TwoWayBound},
@@ -264,6 +265,11 @@ impl<'a> PathArrivals<'a> {
 }
 
 impl Arrivals for PathArrivals<'_> {
+    fn echo_set(&self, length_m: f64) -> Option<EchoSet> {
+        let envelope = &self.engine.pattern.envelope;
+        Some(EchoSet::new(&self.found, self.face_echoes.as_ref(), envelope, length_m))
+    }
+
     fn collect_arrivals(&self, direction_rad: f64, arrivals: &mut Vec<PulseArrival>) {
         self.collect_arrivals_within(direction_rad, f64::INFINITY, arrivals);
     }

@@ -24,6 +24,10 @@ use crate::{
 /// Echo paths from the face to the face.
 pub(crate) struct FaceEchoes {
     face: Disc,
+    /// Bound of the last path of a sequence.
+    best: BestLastPath,
+    /// Length of the shortest path, metres; infinite without any.
+    shortest_m: f64,
     paths: Vec<FacePath>,
     /// Index by direction of departure.
     departures: DirectionIndex,
@@ -36,25 +40,16 @@ impl FaceEchoes {
         envelope: &PatternEnvelope,
         settings: &PathSettings,
     ) -> Self {
-        let floor = MULTIPLE_FLOOR_RATIO * settings.floor;
-        // A nearer wall is not in the far field of the disc's zones.
-        let far = || {
-            let far = |(echo, _): &(&PathEcho, u32)| {
-                let is_level = echo.rise_rad == [0.0; 2];
-                echo.length_m > 2.0 * face.face.radius_m && is_level
-            };
-            echoes.iter().zip(0..).filter(far)
-        };
-        let best = BestLastPath::from_paths(far().map(|(echo, _)| (echo.length_m, echo.amplitude)));
+        let far = || echoes.iter().filter(|echo| is_far(&face, echo));
+        let best = BestLastPath::from_paths(far().map(|echo| (echo.length_m, echo.amplitude)));
+        let shortest_m = far().map(|echo| echo.length_m).fold(f64::INFINITY, f64::min);
+        let departures = DirectionIndex::new(&[]);
+        let mut found = Self { face, best, shortest_m, paths: Vec::new(), departures };
         let mut paths = Vec::new();
         let mut entries = Vec::new();
-        for (echo, index) in far() {
-            // Upper bound, with the face in the direction of departure.
-            let bound = best.after(&face, echo.length_m, echo.amplitude);
-            let reach_rad = envelope.reach_rad(floor / bound);
-            if bound < floor || reach_rad == 0.0 {
-                continue;
-            }
+        for (echo, index) in echoes.iter().zip(0..) {
+            let reach_rad = found.departure_reach_rad(echo, envelope, settings.floor);
+            let Some(reach_rad) = reach_rad else { continue };
             let leaves_rad = echo.departure.to_angle();
             entries.push(DirectionEntry {
                 middle_rad: leaves_rad,
@@ -73,7 +68,31 @@ impl FaceEchoes {
                 own_reverse: echo.departure.distance(echo.arrival) < SAME_RAD,
             });
         }
-        Self { face, paths, departures: DirectionIndex::new(&entries) }
+        (found.paths, found.departures) = (paths, DirectionIndex::new(&entries));
+        found
+    }
+
+    /// Length of the shortest path that the face can reflect, metres; infinite without any.
+    pub(crate) const fn shortest_m(&self) -> f64 {
+        self.shortest_m
+    }
+
+    /// Offset from its departure beyond which no multiple echo can begin with an echo path, radians;
+    /// `None` if none can in any direction. `floor` is the weakest echo of the search.
+    pub(crate) fn departure_reach_rad(
+        &self,
+        echo: &PathEcho,
+        envelope: &PatternEnvelope,
+        floor: f64,
+    ) -> Option<f64> {
+        if !is_far(&self.face, echo) {
+            return None;
+        }
+        let floor = MULTIPLE_FLOOR_RATIO * floor;
+        // Upper bound, with the face in the direction of departure.
+        let bound = self.best.after(&self.face, echo.length_m, echo.amplitude);
+        let reach_rad = envelope.reach_rad(floor / bound);
+        (bound >= floor && reach_rad > 0.0).then_some(reach_rad)
     }
 
     /// Returns all multiple echoes up to a length, metres, with at least one reflection at the
@@ -111,4 +130,10 @@ impl FaceEchoes {
         let outs: SmallVec<[(FacePath, f64); 16]> = near.iter().map(turned).collect();
         SequenceSearch::new(self.face, &outs, floor, max_m).run()
     }
+}
+
+/// Returns `true` for a path that the face can reflect: in the plane, and from the far field of the
+/// disc's zones.
+fn is_far(face: &Disc, echo: &PathEcho) -> bool {
+    echo.length_m > 2.0 * face.face.radius_m && echo.rise_rad == [0.0; 2]
 }
