@@ -51,6 +51,8 @@ const CLOSE_TIMEOUT: Duration = Duration::from_secs(15);
 enum JournalEntry {
     Record(Box<Record>),
     Rotation(Rotation),
+    /// Request for a message once the entries before it are written.
+    Flush(Sender<()>),
     Close,
 }
 
@@ -117,6 +119,7 @@ impl std::fmt::Debug for JournalEntry {
         f.write_str(match self {
             Self::Record(_) => "Record",
             Self::Rotation(_) => "Rotation",
+            Self::Flush(_) => "Flush",
             Self::Close => "Close",
         })
     }
@@ -184,6 +187,16 @@ impl Journal {
     /// Sets the limits of log files, from the next scan on.
     pub fn set_rotation(&self, rotation: Rotation) {
         self.push(JournalEntry::Rotation(rotation));
+    }
+
+    /// Waits until the records queued so far are written, or an attempt to write them has failed.
+    /// The wait is measured by the system's clock: the disk does not follow that of the runtime.
+    pub async fn flush(&self, timeout: Duration) {
+        let (done, flushed) = channel();
+        self.push(JournalEntry::Flush(done));
+        // A timeout is no error: callers examine the log.
+        let waiting = tokio::task::spawn_blocking(move || flushed.recv_timeout(timeout).ok());
+        drop(waiting.await);
     }
 
     /// Current state of the log.
@@ -306,9 +319,11 @@ impl JournalWriter {
         loop {
             let entry = incoming.recv_timeout(self.timeout());
             let received = usize::from(entry.is_ok());
+            let mut flushing = None;
             match entry {
                 Ok(JournalEntry::Record(record)) => self.waiting.push_back(record),
                 Ok(JournalEntry::Rotation(rotation)) => self.log.set_rotation(rotation),
+                Ok(JournalEntry::Flush(done)) => flushing = Some(done),
                 Err(RecvTimeoutError::Timeout) => {}
                 Ok(JournalEntry::Close) | Err(RecvTimeoutError::Disconnected) => {
                     return self.finish();
@@ -320,6 +335,10 @@ impl JournalWriter {
             }
             // Counted until it is written or among the waiting ones.
             self.progress.queued.fetch_sub(received, Ordering::Relaxed);
+            if let Some(done) = flushing {
+                // The caller may have given up.
+                done.send(()).ok();
+            }
         }
     }
 
@@ -422,5 +441,30 @@ impl JournalWriter {
             (_, Ok(())) => None,
         };
         last
+    }
+}
+
+#[cfg(test)]
+mod tests {
+
+    use super::*;
+
+    /// A flush returns after the records before it, even if the runtime's clock skips all waits.
+    #[tokio::test(start_paused = true)]
+    async fn flush_waits_for_earlier_records() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let supervisor = Supervisor::default();
+        let sync_interval = Duration::from_secs(2);
+        let rotation = Rotation { max_bytes: 1 << 20, daily: true, keep_bytes: 0, sync_interval };
+        let (journal, thread) = Journal::open(folder.path(), rotation, &supervisor).expect("opens");
+        for round in 1..=20 {
+            for number in 0..50 {
+                journal.event(EventKind::Explanation, format!("{round}, {number}"));
+            }
+            journal.flush(Duration::from_secs(60)).await;
+            assert_eq!(journal.written(), round * 50);
+            assert_eq!(journal.status().waiting, 0);
+        }
+        assert_eq!(thread.close().error, None);
     }
 }

@@ -37,7 +37,7 @@ mod settings;
 mod simulated_array;
 mod state;
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use jiff::Timestamp;
 use sonard_api::{
@@ -265,6 +265,12 @@ impl Handle {
     #[must_use]
     pub fn records_written(&self) -> u64 {
         self.journal.written()
+    }
+
+    /// Waits until the records published so far are in the log, or can't be written; for at most
+    /// `timeout`.
+    pub async fn flush_log(&self, timeout: Duration) {
+        self.journal.flush(timeout).await;
     }
 
     /// Current health of the daemon, with the reasons of a problem.

@@ -10,7 +10,12 @@ use std::{
     sync::Arc,
 };
 
+use rustix::{
+    fs::{CWD, RenameFlags, renameat_with},
+    io::Errno,
+};
 use tokio::{net::UnixListener, sync::watch};
+use uuid::Uuid;
 
 use super::listener::DynamicListener;
 
@@ -161,21 +166,38 @@ impl Drop for UnixEndpoint {
     }
 }
 
+/// Binds a socket at `path`, which must not exist. The socket is bound at a temporary path and then
+/// renamed, so that it accepts connections and has its permissions when it appears, and its id is
+/// not that of a file that replaces it meanwhile.
 fn bind(path: &Path, mode: u32) -> io::Result<(UnixListener, FileId)> {
-    // Fails if the path exists.
-    let listener = StdListener::bind(path)?;
+    // In the same folder, and as short as most names: the length of a socket's path is limited.
+    let draft = path.with_file_name(format!(".{:08x}.sock", Uuid::new_v4().as_fields().0));
+    let listener = StdListener::bind(&draft)?;
     let prepared = || {
-        fs::set_permissions(path, fs::Permissions::from_mode(mode))?;
+        fs::set_permissions(&draft, fs::Permissions::from_mode(mode))?;
         listener.set_nonblocking(true)?;
-        let there = fs::symlink_metadata(path)?;
+        let there = fs::symlink_metadata(&draft)?;
+        rename_to_free(&draft, path)?;
         Ok((there.dev(), there.ino()))
     };
     match prepared() {
         Ok(id) => Ok((UnixListener::from_std(listener)?, id)),
         Err(error) => {
-            drop(fs::remove_file(path));
+            drop(fs::remove_file(&draft));
             Err(error)
         }
+    }
+}
+
+/// Renames a file, unless a file of the new name exists.
+fn rename_to_free(from: &Path, to: &Path) -> io::Result<()> {
+    match renameat_with(CWD, from, CWD, to, RenameFlags::NOREPLACE) {
+        // The file system does not support the flag.
+        Err(Errno::INVAL | Errno::NOSYS) => {
+            fs::hard_link(from, to)?;
+            fs::remove_file(from)
+        }
+        renamed => Ok(renamed?),
     }
 }
 
@@ -253,6 +275,50 @@ mod tests {
         }
         drop(endpoint);
         assert!(!path.exists());
+    }
+
+    #[tokio::test]
+    async fn sockets_are_complete_when_they_appear() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("s");
+        // Without the rename, the mode can be that of the process, and connections are refused.
+        let watched = path.clone();
+        let watching = std::thread::spawn(move || {
+            for _ in 0..100 {
+                let there = loop {
+                    if let Ok(there) = fs::metadata(&watched)
+                        && there.file_type().is_socket()
+                    {
+                        break there;
+                    }
+                };
+                assert_eq!(there.mode() & 0o7777, 0o640);
+                UnixStream::connect(&watched).expect("connects");
+                // A file of the same name is not the endpoint's, however early it is created.
+                fs::remove_file(&watched).expect("exists");
+                fs::write(&watched, "theirs").expect("there is room");
+            }
+        });
+        for _ in 0..100 {
+            let (endpoint, _listener) = bound(&path);
+            while !fs::read(&path).is_ok_and(|content| content == b"theirs") {}
+            drop(endpoint);
+            assert_eq!(fs::read(&path).expect("kept"), b"theirs");
+            fs::remove_file(&path).expect("exists");
+        }
+        watching.join().expect("no failure");
+        assert_eq!(fs::read_dir(folder.path()).expect("exists").count(), 0);
+    }
+
+    #[tokio::test]
+    async fn failed_bind_leaves_no_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("s");
+        fs::write(&path, "theirs").expect("there is room");
+        let error = bind(&path, 0o640).expect_err("the path exists");
+        assert_eq!(error.kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(fs::read(&path).expect("kept"), b"theirs");
+        assert_eq!(fs::read_dir(folder.path()).expect("exists").count(), 1);
     }
 
     #[tokio::test]

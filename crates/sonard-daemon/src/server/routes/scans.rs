@@ -204,10 +204,16 @@ pub(super) fn scan_not_found() -> ApiError {
 pub(super) async fn wait_written(api: &Api, scan: Uuid) -> Result<Option<ScanSpan>, ApiError> {
     let mut wait = Duration::from_millis(5);
     let until = Instant::now() + WRITE_TIMEOUT;
+    let mut is_flushed = false;
     loop {
         let passage = in_history(api, move |history| history.scan_span(scan)).await?;
         if let Some(passage) = passage.filter(|passage| passage.view.end.is_some()) {
             return Ok(Some(passage));
+        }
+        if !is_flushed {
+            api.daemon.flush_log(WRITE_TIMEOUT).await;
+            is_flushed = true;
+            continue;
         }
         if Instant::now() >= until {
             return Ok(None);
