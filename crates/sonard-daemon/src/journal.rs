@@ -446,7 +446,6 @@ impl JournalWriter {
 
 #[cfg(test)]
 mod tests {
-
     use super::*;
 
     /// A flush returns after the records before it, even if the runtime's clock skips all waits.

@@ -202,25 +202,26 @@ pub(super) fn scan_not_found() -> ApiError {
 
 /// Waits until all of a completed scan is in the log; `None` on timeout.
 pub(super) async fn wait_written(api: &Api, scan: Uuid) -> Result<Option<ScanSpan>, ApiError> {
-    let mut wait = Duration::from_millis(5);
     let until = Instant::now() + WRITE_TIMEOUT;
-    let mut is_flushed = false;
+    if let Some(passage) = find_complete(api, scan).await? {
+        return Ok(Some(passage));
+    }
+    api.daemon.flush_log(WRITE_TIMEOUT).await;
+    let mut wait = Duration::from_millis(5);
     loop {
-        let passage = in_history(api, move |history| history.scan_span(scan)).await?;
-        if let Some(passage) = passage.filter(|passage| passage.view.end.is_some()) {
-            return Ok(Some(passage));
-        }
-        if !is_flushed {
-            api.daemon.flush_log(WRITE_TIMEOUT).await;
-            is_flushed = true;
-            continue;
-        }
-        if Instant::now() >= until {
-            return Ok(None);
+        let passage = find_complete(api, scan).await?;
+        if passage.is_some() || Instant::now() >= until {
+            return Ok(passage);
         }
         sleep(wait).await;
         wait = (wait * 2).min(Duration::from_millis(200));
     }
+}
+
+/// Finds a scan whose end is in the log.
+async fn find_complete(api: &Api, scan: Uuid) -> Result<Option<ScanSpan>, ApiError> {
+    let passage = in_history(api, move |history| history.scan_span(scan)).await?;
+    Ok(passage.filter(|passage| passage.view.end.is_some()))
 }
 
 /// Queries the logs on a blocking thread.
